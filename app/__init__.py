@@ -1,0 +1,1 @@
+"""What a person sees: Qt windows, workflows, command line. The only place that imports Qt."""

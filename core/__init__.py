@@ -1,0 +1,1 @@
+"""What the application knows: surfaces, geodesics, relocation, records, exchange. No Qt, no device."""

@@ -1,0 +1,1 @@
+"""What sees the patient: cameras, recordings, the simulated patient, skeleton trackers."""
