@@ -1,0 +1,1 @@
+"""The command line: the same engine with no screen, no device and no database."""

@@ -1,0 +1,68 @@
+"""The ``geoderm`` command: collects the subcommands and turns errors into exit codes.
+
+Exit codes: 0 done; 2 wrong use or bad input; 3 the work could not be done. Never a traceback: an error of
+the world is one line on standard error; a bug is logged with its trace and told in one line.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import typer
+
+from app.logs import log_bug
+from core.errors import GeodermError
+
+COMMAND_MODULES = (
+    "app.cli.gui",
+    "app.cli.capture_info",
+    "app.cli.relocate",
+    "app.cli.geodesics",
+    "app.cli.simulate",
+    "app.cli.records",
+    "app.cli.evaluate",
+    "app.cli.devices",
+)
+"""Each has ``register(app)``. Their heavy imports happen inside the commands."""
+
+
+def build_app() -> typer.Typer:
+    """Typer application with every subcommand."""
+    cli = typer.Typer(
+        name="geoderm",
+        help="Finds every mole of a patient again. Measures and relocates; it does not diagnose.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    for name in COMMAND_MODULES:
+        importlib.import_module(name).register(cli)
+    return cli
+
+
+def run(arguments: list[str] | None = None) -> None:
+    """Run the command and leave the process with its exit code."""
+    sys.exit(main(arguments))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    try:
+        build_app()(args=arguments, prog_name="geoderm", standalone_mode=True)
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else (0 if stop.code is None else 2)
+    except GeodermError as error:
+        sys.stderr.write(f"geoderm: {' '.join(str(error).split())}\n")
+        return error.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write("geoderm: stopped\n")
+        return 130
+    except BrokenPipeError:
+        return 0
+    except Exception:  # noqa: BLE001 - the outermost door: a bug is logged with its trace, never shown as one
+        path = log_bug("command line")
+        sys.stderr.write(f"geoderm: internal error; nothing was changed. Details are in {path}\n")
+        return 3
+    return 0
