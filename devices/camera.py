@@ -57,7 +57,7 @@ class PreviewFrame:
 
 @runtime_checkable
 class DepthCamera(Protocol):
-    """A depth camera with or without a colour camera beside it. Also a context manager: opens, then closes."""
+    """A depth camera with or without a colour camera beside it. A context manager: opens, then closes."""
 
     @property
     def info(self) -> DeviceInfo:

@@ -81,7 +81,7 @@ def open_device(device_id: str) -> DepthCamera:
     kind, colon, address = device_id.partition(":")
     if not colon:
         raise InputError(
-            f"'{device_id}' is not a camera.", "Write kind:address, for example simulator:m_young_avg."
+            f"'{device_id}' is not a camera.", "Write kind:address, such as simulator:m_young_avg."
         )
     camera = camera_factory(kind).create(address)
     camera.open()
