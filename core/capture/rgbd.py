@@ -83,9 +83,11 @@ class RgbdCapture:
     taken_at : datetime
         Time zone aware.
     mirrored : bool
-        True if the recording is a mirror image of the patient. `unmirrored` mends it.
+        True if the recording is a mirror image of the patient. `core.capture.mirror.unmirror` mends it.
     joints_m : dict of str to ndarray (3,) or None
         Recorded joints in the depth-camera frame, the subject's own left and right.
+    warnings : tuple of str
+        What the device knows to be less than it should be, for example a nominal calibration.
     """
 
     depth_frames: NDArray[np.uint16]
@@ -97,6 +99,7 @@ class RgbdCapture:
     taken_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     mirrored: bool = False
     joints_m: dict[str, FloatArray] | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         d, cam = self.depth_frames, self.rig.depth
