@@ -78,7 +78,9 @@ class PinholeCamera:
         q = np.asarray(pixels, dtype=float).reshape(-1, 2)
         out = np.ones((len(q), 3))
         if len(q) and any(self.distortion):
-            out[:, :2] = cv2.undistortPoints(q.reshape(-1, 1, 2), self.matrix, self._coefficients).reshape(-1, 2)
+            out[:, :2] = cv2.undistortPoints(q.reshape(-1, 1, 2), self.matrix, self._coefficients).reshape(
+                -1, 2
+            )
         else:
             out[:, 0] = (q[:, 0] - self.cx) / self.fx
             out[:, 1] = (q[:, 1] - self.cy) / self.fy
