@@ -89,3 +89,6 @@ def open_device(device_id: str) -> DepthCamera:
 
 
 register_camera("simulator", "devices.simulator.camera_device:SIMULATED_CAMERAS")
+register_camera("openni", "devices.openni.cameras:CONNECTED_CAMERAS")
+register_camera("recording", "devices.openni.cameras:RECORDINGS")
+register_camera("folder", "devices.folders:FOLDERS")
