@@ -1,0 +1,64 @@
+"""``geoderm simulate``: a capture of a simulated patient, as a capture folder or an .oni recording."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import typer
+
+from core.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("simulate")(simulate)
+
+
+def simulate(
+    out: Path = typer.Argument(..., help="Capture folder to write, or a file name ending in .oni."),
+    shape: str = typer.Option("m_young_avg", help="Body: m_young_avg, f_young_avg, m_tall_thin ..."),
+    stance: str = typer.Option("psi", help="Stance: psi, A, T, down, forward, up, knee, twist ..."),
+    view: str = typer.Option("front", help="front, back, left or right."),
+    visit: int = typer.Option(1, min=1, help="Visit number: the same moles, another day."),
+    frames: int = typer.Option(30, min=1, max=300, help="Depth frames."),
+    distance: float = typer.Option(2.3, "--distance-m", min=0.8, max=4.0, help="Camera to patient, metres."),
+    turn: float = typer.Option(0.0, "--turn-deg", min=-180, max=180, help="Turn of the body, degrees."),
+    seed: int = typer.Option(0, help="Seed of the patient's skin and of the noise."),
+    joints: bool = typer.Option(False, "--joints", help="Store the simulator's own joints in the capture."),
+) -> None:
+    """Write a capture of a simulated patient. The true places of its lesions go into lesions.json."""
+    if out.exists():
+        raise InputError(f"{out}: exists already.", "Choose another name.")
+    from core.capture import write_capture
+    from devices.simulator import SimulatedPatient
+
+    patient = SimulatedPatient(shape=shape, seed=seed)
+    simulated = patient.capture(
+        stance=stance,
+        view=view,
+        visit=visit,
+        frames=frames,
+        distance_m=distance,
+        turn_deg=turn,
+        joints=joints,
+        seed=seed + visit,
+    )
+    if out.suffix == ".oni":
+        from devices.openni.cameras import write_oni
+
+        write_oni(simulated.capture, out)
+        lesions = out.with_suffix(".lesions.json")
+    else:
+        write_capture(simulated.capture, out)
+        lesions = out / "lesions.json"
+    truth = simulated.truth
+    listed = [
+        {"id": str(i), "pixel": [round(float(c), 2) for c in pixel]}
+        for i, pixel, seen in zip(truth.mole_ids, truth.mole_pixels, truth.mole_visible, strict=True)
+        if seen and str(i) in {str(lesion) for lesion in patient.lesion_ids}
+    ]
+    lesions.write_text(json.dumps({"lesions": listed}, indent=1), encoding="utf-8")
+    typer.echo(
+        f"{out}: {stance}, {view}, visit {visit}, {frames} depth frames, {len(listed)} lesions in view"
+    )

@@ -1,0 +1,14 @@
+"""Where the application keeps a user's files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import platformdirs
+
+
+def default_data_dir() -> Path:
+    """Folder of the clinic's records; ``GEODERM_DATA_DIR`` overrides the platform's place."""
+    named = os.environ.get("GEODERM_DATA_DIR")
+    return Path(named) if named else Path(platformdirs.user_data_path("geoderm", appauthor=False)) / "clinic"
