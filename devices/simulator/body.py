@@ -138,7 +138,9 @@ def load_body(shape: str) -> BodyModel:
         If there is no such shape.
     """
     if shape not in SHAPES:
-        raise InputError(f"There is no simulated body called '{shape}'.", f"Choose one of: {', '.join(SHAPES)}.")
+        raise InputError(
+            f"There is no simulated body called '{shape}'.", f"Choose one of: {', '.join(SHAPES)}."
+        )
     with (
         np.load(resource_path("bodies", "anny_common.npz")) as common,
         np.load(resource_path("bodies", f"anny_{shape}.npz")) as own,
@@ -215,7 +217,8 @@ def pose_body(model: BodyModel, local: dict[str, FloatArray], bind: FloatArray |
     ground = np.array([pelvis[0], pelvis[1], vertices[:, 2].min()])
     joints = {name: p - ground for name, p in _nite_joints(model, rotation, origin).items()}
     bend = {
-        name: float(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0))) for name, turn in local.items()
+        name: float(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
+        for name, turn in local.items()
     }
     return PosedBody(model, vertices - ground, joints, bend)
 
