@@ -1,0 +1,41 @@
+"""Anchors: the 15 joints and further landmarks of a person, on the skin, with their reliability."""
+
+from core.anchors.analyse import AnalysedCapture, analyse_capture, with_skeleton
+from core.anchors.calibration import SkeletonCalibration, apply_calibration, calibrate_skeleton
+from core.anchors.finding import find_skeleton
+from core.anchors.left_right import LeftRightReport, Sides, exchange_sides, guard_left_right
+from core.anchors.names import BONES, EXTRA_NAMES, JOINT_NAMES, LANDMARK_NAMES, opposite
+from core.anchors.psi import PsiReport, check_psi
+from core.anchors.relief import shade_depth
+from core.anchors.skeleton import VISIBLE, Joint, PoseLandmarks, Skeleton, SkeletonTracker
+from core.anchors.skin_anchors import Anchor, AnchorSet, project_to_skin
+
+__all__ = [
+    "BONES",
+    "EXTRA_NAMES",
+    "JOINT_NAMES",
+    "LANDMARK_NAMES",
+    "VISIBLE",
+    "AnalysedCapture",
+    "Anchor",
+    "AnchorSet",
+    "Joint",
+    "LeftRightReport",
+    "PoseLandmarks",
+    "PsiReport",
+    "Sides",
+    "Skeleton",
+    "SkeletonCalibration",
+    "SkeletonTracker",
+    "analyse_capture",
+    "apply_calibration",
+    "calibrate_skeleton",
+    "check_psi",
+    "exchange_sides",
+    "find_skeleton",
+    "guard_left_right",
+    "opposite",
+    "project_to_skin",
+    "shade_depth",
+    "with_skeleton",
+]

@@ -1,0 +1,88 @@
+"""A depth image drawn as a lit sculpture, so that a tracker made for photographs can read it.
+
+Median, bilateral filter, normals, one lamp, skin colour on grey (METHOD section 4, DEVICES). It serves
+recordings without colour, dark rooms, and as a second opinion.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.capture.camera import PinholeCamera
+
+FloatArray = NDArray[np.float64]
+
+LAMPS: Final[tuple[tuple[float, float, float], ...]] = (
+    (-0.35, -0.55, -0.75),
+    (0.35, -0.55, -0.75),
+    (0.0, -0.25, -0.97),
+)
+"""Directions towards lamps in camera axes (x right, y down, z away): upper left, upper right, in front."""
+
+_SKIN = np.array([226.0, 178.0, 150.0])
+_BACKGROUND = 118.0
+_AMBIENT = 0.28
+
+
+def shade_depth(
+    depth_m: FloatArray,
+    mask: NDArray[np.bool_],
+    camera: PinholeCamera,
+    lamp: tuple[float, float, float] = LAMPS[0],
+) -> NDArray[np.uint8]:
+    """Shaded relief of a depth image.
+
+    Parameters
+    ----------
+    depth_m : ndarray (h, w)
+        Metres, 0 where there is no measurement.
+    mask : ndarray (h, w) of bool
+        The body; everything else becomes plain grey.
+    camera : PinholeCamera
+        The depth camera.
+    lamp : tuple of float
+        Direction from the body towards the lamp in camera axes.
+
+    Returns
+    -------
+    ndarray (h, w, 3) uint8
+        RGB.
+    """
+    shape = (camera.height, camera.width)
+    seen = mask & (depth_m > 0)
+    image = np.full((*shape, 3), _BACKGROUND)
+    if not seen.any():
+        return image.astype(np.uint8)
+    filled = _fill(np.where(seen, depth_m, 0.0), seen)
+    smooth = cv2.bilateralFilter(cv2.medianBlur(filled, 5), 7, 0.03, 3.0).astype(np.float64)
+    normals = _normals(camera.pixel_rays * smooth[..., None])
+    towards = np.asarray(lamp) / np.linalg.norm(lamp)
+    light = np.clip(normals @ towards, 0.0, 1.0)
+    near, far = np.percentile(depth_m[seen], [2.0, 98.0])
+    haze = 1.0 - 0.25 * np.clip((smooth - near) / max(far - near, 0.2), 0.0, 1.0)
+    brightness = (_AMBIENT + (1.0 - _AMBIENT) * light) * haze
+    image[seen] = brightness[seen, None] * _SKIN
+    return np.asarray(np.clip(image, 0, 255), dtype=np.uint8)
+
+
+def _fill(depth: FloatArray, seen: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Depth with the background set to the nearest body pixel's depth, so that no rim is lit falsely."""
+    _, label = cv2.distanceTransformWithLabels(
+        (~seen).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    of_label = np.zeros(int(label.max()) + 1)
+    of_label[label[seen]] = depth[seen]
+    return np.asarray(of_label[label], dtype=np.float32)
+
+
+def _normals(points: FloatArray) -> FloatArray:
+    """Unit normals (h, w, 3) towards the camera of an image of points."""
+    across = cv2.Sobel(points, cv2.CV_64F, 1, 0, ksize=3)
+    down = cv2.Sobel(points, cv2.CV_64F, 0, 1, ksize=3)
+    normals = np.cross(down, across)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.asarray(normals / np.maximum(length, 1e-12))
