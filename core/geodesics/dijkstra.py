@@ -8,47 +8,53 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from core.geodesics.heap import heap_pop, heap_raise
+from core.geodesics.buckets import bucket_sizes, new_queue, put, remove
 from core.geodesics.meshes import FloatArray, IntArray, Source, checked_mesh, seed_sources
 from core.geodesics.paths import trace_edge_path
 from core.geodesics.solver import each_source
-from core.geodesics.wedges import build_wedges
+from core.geodesics.wedges import UnsignedArray, build_wedges
 from core.surface.points import SurfacePoint
 
-EdgeGraph = tuple[IntArray, IntArray, NDArray[np.float32]]
+EdgeGraph = tuple[UnsignedArray, UnsignedArray, NDArray[np.float32]]
 """Neighbours in compressed sparse rows: start (n + 1,), neighbours (e,), lengths (e,)."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def dijkstra_front(start, neighbours, lengths, seeds, starts, d):  # type: ignore[no-untyped-def]
-    """Fill ``d`` (n,) float64 with graph distances to one source given by ``seeds`` (3,) and ``starts`` (3,)."""
+def dijkstra_front(start, neighbours, lengths, width, buckets, seeds, starts, d):  # type: ignore[no-untyped-def]
+    """Fill ``d`` (n,) float64 with graph distances to one source given by ``seeds`` and ``starts`` (3,)."""
     n = d.shape[0]
     d[:] = np.inf
-    place = np.full(n, -1, np.int32)
-    heap = np.empty(n, np.int32)
-    size = 0
+    ring, link = new_queue(n, buckets)
+    queued = 0
     for i in range(seeds.shape[0]):
-        v = seeds[i]
+        v = np.uint32(seeds[i])
         if starts[i] < d[v]:
             d[v] = starts[i]
-            size = heap_raise(heap, place, d, size, v)
-    while size > 0:
-        a, size = heap_pop(heap, place, d, size)
+            queued += put(ring, link, v, np.int64(starts[i] / width), np.int64(0))
+    present = np.int64(0)
+    while queued > 0:
+        first = ring[np.uint32(present & (buckets - 1)), 0]
+        if first < 0:
+            present += 1
+            continue
+        a = np.uint32(first)
+        remove(ring, link, a)
+        queued -= 1
         da = d[a]
-        for k in range(start[a], start[a + 1]):
+        for k in range(start[a], start[a + np.uint32(1)]):
             t = neighbours[k]
-            candidate = da + lengths[k]
+            candidate = da + np.float64(lengths[k])
             if candidate < d[t]:
                 d[t] = candidate
-                size = heap_raise(heap, place, d, size, t)
+                queued += put(ring, link, t, np.int64(candidate / width), present)
 
 
 @numba.njit(nogil=True, cache=True)
 def _edges_of_wedges(start, corners, shape):  # type: ignore[no-untyped-def]
     n = start.shape[0] - 1
     seen = np.full(n, -1, np.int32)
-    first = np.zeros(n + 1, np.int32)
-    neighbours = np.empty(2 * corners.shape[0], np.int32)
+    first = np.zeros(n + 1, np.uint32)
+    neighbours = np.empty(2 * corners.shape[0], np.uint32)
     lengths = np.empty(2 * corners.shape[0], np.float32)
     total = 0
     for a in range(n):
@@ -71,12 +77,17 @@ class GraphSolver:
 
     def __init__(self, vertices: FloatArray, triangles: IntArray, graph: EdgeGraph) -> None:
         self.vertices, self.triangles, self.graph = vertices, triangles, graph
+        self._width, self._buckets = bucket_sizes(graph[2])
 
     def distances(self, sources: Sequence[Source], *, threads: int = 2) -> FloatArray:
         """Distances (s, n); see `core.geodesics.solver.GeodesicSolver`."""
         seeds, starts = seed_sources(self.vertices, self.triangles, sources)
         out = np.empty((len(sources), len(self.vertices)), dtype=np.float64)
-        each_source(len(sources), threads, lambda i: dijkstra_front(*self.graph, seeds[i], starts[i], out[i]))
+
+        def solve(i: int) -> None:
+            dijkstra_front(*self.graph, self._width, self._buckets, seeds[i], starts[i], out[i])
+
+        each_source(len(sources), threads, solve)
         return out
 
     def path(self, distances: FloatArray, target: SurfacePoint, source: Source | None = None) -> FloatArray:

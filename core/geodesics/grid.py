@@ -14,8 +14,8 @@ from core.geodesics.meshes import DepthGridSurface, checked_mesh
 def _eight_neighbours(vertices, pixels, vertex_of_pixel, jump):  # type: ignore[no-untyped-def]
     n = vertices.shape[0]
     height, width = vertex_of_pixel.shape
-    start = np.zeros(n + 1, np.int32)
-    neighbours = np.empty(8 * n, np.int32)
+    start = np.zeros(n + 1, np.uint32)
+    neighbours = np.empty(8 * n, np.uint32)
     lengths = np.empty(8 * n, np.float32)
     total = 0
     for a in range(n):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from core.errors import InputError, WorkError
 from core.geodesics.meshes import FloatArray, IntArray, Source, checked_point
-from core.geodesics.wedges import WedgeGraph
+from core.geodesics.wedges import UnsignedArray, WedgeGraph
 from core.surface.points import SurfacePoint
 
 
@@ -76,7 +76,6 @@ def _walk_down(vertices, start, corners, d, home, a, b, c, x, path):  # type: ig
         best_end = math.inf
         share = 0.0
         value = 0.0
-        way = 0.0
         p = -1
         q = -1
         end = -1
@@ -84,13 +83,13 @@ def _walk_down(vertices, start, corners, d, home, a, b, c, x, path):  # type: ig
             candidates = 1
             first = 0
         else:
-            first = start[a]
-            candidates = start[a + 1] - first
+            first = np.int64(start[a])
+            candidates = np.int64(start[a + 1]) - first
         for k in range(first, first + candidates):
             if c >= 0:
                 u, v, w = a, b, c
             else:
-                u, v, w = a, corners[k, 0], corners[k, 1]
+                u, v, w = a, np.int64(corners[k, 0]), np.int64(corners[k, 1])
                 if b >= 0 and v != b and w != b:
                     continue
             for e in range(3):  # edges of face (u, v, w) that do not hold x
@@ -109,7 +108,7 @@ def _walk_down(vertices, start, corners, d, home, a, b, c, x, path):  # type: ig
                 t, val, step = _best_crossing(vertices, d, x, f, g, ends_only)
                 if val < here - 1e-9 * (step + val) and val + step < best:
                     best = val + step
-                    share, value, way, p, q = t, val, step, f, g
+                    share, value, p, q = t, val, f, g
                 t, val, step = _best_crossing(vertices, d, x, f, g, True)
                 if val + step < best_end:
                     best_end = val + step
@@ -235,7 +234,8 @@ def trace_front_path(
     keep[1:-1] = (np.diff(points[:-1], axis=0) != 0.0).any(axis=1)
     if len(points) > 2 and not (points[-1] != points[-2]).any():
         keep[-2] = False
-    return points[keep]
+    path: FloatArray = points[keep]
+    return path
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -248,8 +248,8 @@ def _walk_edges(start, neighbours, lengths, d, home, v, path):  # type: ignore[n
             return count
         best = math.inf
         following = -1
-        for k in range(start[v], start[v + 1]):
-            t = neighbours[k]
+        for k in range(np.int64(start[v]), np.int64(start[v + 1])):
+            t = np.int64(neighbours[k])
             if d[t] < d[v] and d[t] + lengths[k] < best:
                 best = d[t] + lengths[k]
                 following = t
@@ -262,7 +262,7 @@ def _walk_edges(start, neighbours, lengths, d, home, v, path):  # type: ignore[n
 def trace_edge_path(
     vertices: FloatArray,
     triangles: IntArray,
-    graph: tuple[IntArray, IntArray, NDArray[np.float32]],
+    graph: tuple[UnsignedArray, UnsignedArray, NDArray[np.float32]],
     distances: FloatArray,
     target: SurfacePoint,
     source: Source | None = None,
@@ -290,4 +290,5 @@ def trace_edge_path(
         raise WorkError("The path could not be followed: the distances do not fall toward a source.")
     points = np.vstack([place, vertices[order[:count]], end])
     keep = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))
-    return points[keep]
+    path: FloatArray = points[keep]
+    return path

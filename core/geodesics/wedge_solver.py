@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from core.geodesics.meshes import FloatArray, IntArray, Source, checked_mesh, seed_sources
 from core.geodesics.paths import trace_front_path
 from core.geodesics.solver import each_source
-from core.geodesics.wedges import WedgeGraph, build_wedges
+from core.geodesics.wedges import build_wedges
 from core.surface.points import SurfacePoint
 
 
@@ -30,16 +30,15 @@ class WedgeSolver(ABC):
         self.vertices, self.triangles = checked_mesh(vertices, triangles)
         self.wedges = build_wedges(self.vertices, self.triangles)
 
-    @staticmethod
     @abstractmethod
-    def _front(wedges: WedgeGraph, seeds: IntArray, starts: FloatArray, out: FloatArray) -> None:
+    def _front(self, seeds: IntArray, starts: FloatArray, out: FloatArray) -> None:
         """Fill ``out`` (n,) with the distances from one source."""
 
     def distances(self, sources: Sequence[Source], *, threads: int = 2) -> FloatArray:
         """Distances (s, n); see `core.geodesics.solver.GeodesicSolver`."""
         seeds, starts = seed_sources(self.vertices, self.triangles, sources)
         out = np.empty((len(sources), len(self.vertices)), dtype=np.float64)
-        each_source(len(sources), threads, lambda i: self._front(self.wedges, seeds[i], starts[i], out[i]))
+        each_source(len(sources), threads, lambda i: self._front(seeds[i], starts[i], out[i]))
         return out
 
     def path(self, distances: FloatArray, target: SurfacePoint, source: Source | None = None) -> FloatArray:
