@@ -81,7 +81,8 @@ def main() -> None:
             about = (module.__doc__ or "").strip()
             measured = (
                 f"Measured {facts['date']} at commit {facts['commit']} "
-                f"on {facts['cores']} cores of {facts['cpu']}, Python {facts['python']}, load before {facts['load_before']}."
+                f"on {facts['cores']} cores of {facts['cpu']}, Python {facts['python']}, "
+                f"load before {facts['load_before']}."
             )
             (OUT / f"{name}.md").write_text(f"# {name}\n\n{about}\n\n{table(rows)}\n\n{measured}\n")
     if not arguments.quick:
