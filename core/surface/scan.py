@@ -1,0 +1,107 @@
+"""From a capture to the patient's skin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.capture.rgbd import RgbdCapture
+from core.progress import Progress, no_progress
+from core.surface.body_surface import BodySurface
+from core.surface.denoise import denoise_depth
+from core.surface.fusion import FusedDepth, fuse_depth
+from core.surface.segmentation import BodyMask, segment_body
+from core.surface.skin_tone import SkinTone, measure_skin_tone
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyScan:
+    """A capture and the skin found in it.
+
+    Attributes
+    ----------
+    capture : RgbdCapture
+    fused : FusedDepth
+        All frames in one, the whole scene.
+    mask : BodyMask
+    surface : BodySurface
+        Of the denoised depth inside the mask.
+    warnings : tuple of str
+    depth_noise_m : float
+        Standard deviation of one measurement on the body, median.
+    body_coverage : float
+        Share of the body's outline in which depth was measured, 0..1.
+    """
+
+    capture: RgbdCapture
+    fused: FusedDepth
+    mask: BodyMask
+    surface: BodySurface
+    warnings: tuple[str, ...]
+    depth_noise_m: float
+    body_coverage: float
+
+    @cached_property
+    def vertex_picture_pixels(self) -> FloatArray:
+        """Picture pixel (n, 2) of every vertex of the surface."""
+        return self.capture.rig.project_to_picture(self.surface.vertices)
+
+    @cached_property
+    def skin_tone(self) -> SkinTone | None:
+        """The person's own skin colour; None without enough of it."""
+        return measure_skin_tone(self.capture, self.vertex_picture_pixels)
+
+
+def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> BodyScan:
+    """Fuse the frames, find the patient, smooth and triangulate the skin.
+
+    Raises
+    ------
+    WorkError
+        If no body is found.
+    Cancelled
+        Through ``progress``.
+    """
+    camera = capture.rig.depth
+    progress(0.0, "Fusing depth frames")
+    fused = fuse_depth(capture.depth_frames, capture.depth_unit_m)
+    progress(0.3, "Finding the body")
+    mask = segment_body(fused.depth_m, camera)
+    progress(0.6, "Smoothing the skin")
+    raw = np.where(mask.mask, fused.depth_m, 0.0)
+    smooth = denoise_depth(raw)
+    progress(0.8, "Building the surface")
+    surface = BodySurface.from_depth(smooth, camera)
+    noise = _noise(fused, raw, smooth)
+    coverage = _coverage(mask.mask)
+    warnings = list(mask.warnings)
+    if coverage < 0.85:
+        warnings.append(
+            f"Only {coverage:.0%} of the body's outline was measured; dark, shiny or steep parts are missing."
+        )
+    progress(1.0, "Skin surface ready")
+    return BodyScan(capture, fused, mask, surface, tuple(warnings), noise, coverage)
+
+
+def _noise(fused: FusedDepth, raw: FloatArray, smooth: FloatArray) -> float:
+    """Noise of a single measurement: from the frames, or with one frame from what smoothing took away."""
+    on = raw > 0
+    measured = fused.noise_m[on]
+    measured = measured[np.isfinite(measured)]
+    if len(measured):
+        return float(np.median(measured))
+    return float(1.4826 * np.median(np.abs(raw[on] - smooth[on])))
+
+
+def _coverage(mask: NDArray[np.bool_]) -> float:
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
+    return float(mask.sum() / max(1, int(filled.sum())))
