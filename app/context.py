@@ -1,0 +1,181 @@
+"""What every window is given: the clinic's store, the user, the task runner, settings, cameras, the tracker.
+
+Public API
+----------
+``context.store``            `core.records.ClinicStore`
+``context.user``             the `User` logged in, or None; ``context.user_id`` raises if nobody is
+``context.tasks``            `app.tasks.TaskRunner`
+``context.settings``         `app.settings.Settings` (frozen); change with ``context.change_settings(privacy_mode=True)``
+``context.privacy_mode``     names are hidden; use ``context.patient_title(patient)`` wherever a name is shown
+``context.demonstration``    True on the demonstration clinic
+``context.cameras``          `CameraSource`: ``.list() -> list[DeviceInfo]``, ``.open(id) -> DepthCamera``
+``context.tracker()``        the `core.anchors.SkeletonTracker` (made on first use; call it in a task: it is slow)
+``context.method``           the relocation method's name, or None for the default
+
+Signals: ``user_changed()``, ``privacy_changed(bool)``, ``records_changed(int)`` (patient id; emit it with
+``context.touch(patient_id)`` after every change to the store so that the other pages refresh).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from PySide6.QtCore import QObject, Signal
+
+from app.settings import Settings, read_settings, write_settings
+from app.tasks import TaskRunner
+from core.errors import WorkError
+
+if TYPE_CHECKING:
+    from core.anchors import SkeletonTracker
+    from core.records import ClinicStore, Patient, User
+    from devices.camera import DepthCamera, DeviceInfo
+
+
+class CameraSource(Protocol):
+    """Where cameras come from: the device registry, or the demonstration's scripted patient."""
+
+    def list(self) -> list[DeviceInfo]:
+        """Every camera that could be opened now."""
+
+    def open(self, camera_id: str) -> DepthCamera:
+        """The camera with that id, not yet opened (it is a context manager)."""
+
+
+class RegisteredCameras:
+    """The cameras of `devices.registry`."""
+
+    def list(self) -> list[DeviceInfo]:
+        """Every camera that could be opened now."""
+        from devices.registry import list_devices
+
+        return list(list_devices())
+
+    def open(self, camera_id: str) -> DepthCamera:
+        """The camera with that id."""
+        from devices.registry import open_device
+
+        return open_device(camera_id)
+
+
+def _default_tracker() -> SkeletonTracker:
+    from devices.trackers import default_tracker
+
+    return default_tracker()
+
+
+class AppContext(QObject):
+    """One per running application; handed to every page.
+
+    Parameters
+    ----------
+    store : ClinicStore
+    data_dir : Path
+        The clinic's folder; the settings live there too.
+    cameras : CameraSource, optional
+        Default: the device registry.
+    tracker_factory : callable, optional
+        Default: `devices.trackers.default_tracker`.
+    demonstration : bool
+        Marks the window as showing a simulated patient.
+    method : str, optional
+        Relocation method; None for the default of `core.relocation`.
+    """
+
+    user_changed = Signal()
+    privacy_changed = Signal(bool)
+    records_changed = Signal(int)
+
+    def __init__(
+        self,
+        store: ClinicStore,
+        data_dir: Path,
+        *,
+        cameras: CameraSource | None = None,
+        tracker_factory: Callable[[], SkeletonTracker] | None = None,
+        demonstration: bool = False,
+        method: str | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.store = store
+        self.data_dir = data_dir
+        self.cameras: CameraSource = cameras or RegisteredCameras()
+        self.demonstration = demonstration
+        self.method = method
+        self.tasks = TaskRunner(self)
+        self.settings: Settings = read_settings(data_dir)
+        self._user: User | None = None
+        self._tracker_factory = tracker_factory or _default_tracker
+        self._tracker: SkeletonTracker | None = None
+
+    @property
+    def user(self) -> User | None:
+        """Who is logged in."""
+        return self._user
+
+    @property
+    def user_id(self) -> int:
+        """Id of who is logged in.
+
+        Raises
+        ------
+        WorkError
+            If nobody is.
+        """
+        if self._user is None:
+            raise WorkError("Nobody is logged in.", "Log in and try again.")
+        return self._user.id
+
+    def log_in(self, user: User) -> None:
+        """Make ``user`` the one whose name is stored with every change."""
+        self._user = user
+        self.change_settings(last_username=user.username)
+        self.user_changed.emit()
+
+    def log_out(self) -> None:
+        """Forget the user."""
+        self._user = None
+        self.user_changed.emit()
+
+    @property
+    def privacy_mode(self) -> bool:
+        """Whether names are hidden."""
+        return self.settings.privacy_mode
+
+    def set_privacy_mode(self, on: bool) -> None:
+        """Hide or show names in every window."""
+        if on != self.settings.privacy_mode:
+            self.change_settings(privacy_mode=on)
+            self.privacy_changed.emit(on)
+
+    def patient_title(self, patient: Patient) -> str:
+        """The patient's name, or only the clinic number in privacy mode."""
+        if self.privacy_mode:
+            return f"Patient {patient.clinic_number}" if patient.clinic_number else f"Patient #{patient.id}"
+        return f"{patient.family_name}, {patient.given_name}".strip(", ")
+
+    def change_settings(self, **changes: Any) -> None:
+        """Change and store settings."""
+        self.settings = self.settings.with_(**changes)
+        write_settings(self.data_dir, self.settings)
+
+    def touch(self, patient_id: int) -> None:
+        """Tell every page that the patient's records have changed."""
+        self.records_changed.emit(patient_id)
+
+    def tracker(self) -> SkeletonTracker:
+        """The skeleton tracker, made on first use (seconds: call it in a task)."""
+        if self._tracker is None:
+            self._tracker = self._tracker_factory()
+        return self._tracker
+
+    def close(self) -> None:
+        """End the tasks, the tracker and the store. Call it once, when the last window is gone."""
+        self.tasks.shut_down()
+        if self._tracker is not None:
+            self._tracker.close()
+            self._tracker = None
+        self.store.close()

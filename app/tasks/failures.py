@@ -1,0 +1,90 @@
+"""What happens to an error: the world's are told to the user, the application's own are logged without data."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from types import TracebackType
+
+import platformdirs
+
+from core.errors import GeodermError
+
+LOGGER = logging.getLogger("geoderm.failures")
+
+BUG_MESSAGE = "Something went wrong; the visit is saved."
+BUG_ADVICE = "Please try again. If it happens again, send the log file to your GeoDerm support."
+
+
+@dataclass(frozen=True)
+class TaskFailure:
+    """An error as the user is told of it.
+
+    Attributes
+    ----------
+    message, advice : str
+        What happened and what to do.
+    is_bug : bool
+        True if it is the application's own error (logged with its trace), False for the world's.
+    """
+
+    message: str
+    advice: str
+    is_bug: bool
+
+
+def log_path() -> Path:
+    """The log file in the user's log folder."""
+    return Path(platformdirs.user_log_dir("geoderm", appauthor=False)) / "geoderm.log"
+
+
+def start_logging(path: Path | None = None) -> Path:
+    """Write failures to ``path`` (default `log_path`), and return where they go. Calling twice is harmless."""
+    target = path or log_path()
+    for handler in LOGGER.handlers:
+        if isinstance(handler, RotatingFileHandler) and Path(handler.baseFilename) == target.absolute():
+            return target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handler = RotatingFileHandler(target, maxBytes=500_000, backupCount=3, delay=True, encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    LOGGER.addHandler(handler)
+    LOGGER.propagate = False
+    return target
+
+
+def trace_without_data(error: BaseException) -> str:
+    """The trace of ``error`` by file, line and function; no message and no values, which may name a patient."""
+    lines: list[str] = []
+    seen: set[int] = set()
+    current: BaseException | None = error
+    while current is not None and id(current) not in seen:
+        seen.add(id(current))
+        lines.append(type(current).__qualname__)
+        lines += [f"  {f.filename}:{f.lineno} {f.name}" for f in traceback.extract_tb(current.__traceback__)]
+        current = current.__cause__ or current.__context__
+    return "\n".join(lines)
+
+
+def describe_failure(error: BaseException) -> TaskFailure:
+    """How to tell the user of ``error``; an error that is not of the world is logged with its trace."""
+    if isinstance(error, GeodermError):
+        return TaskFailure(error.message, error.advice, is_bug=False)
+    LOGGER.error("%s", trace_without_data(error))
+    return TaskFailure(BUG_MESSAGE, BUG_ADVICE, is_bug=True)
+
+
+def install_excepthook(show: Callable[[TaskFailure], None]) -> None:
+    """Tell the user of errors that reach the top of the GUI thread, instead of printing a traceback."""
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if issubclass(kind, KeyboardInterrupt | SystemExit):
+            sys.__excepthook__(kind, error, trace)
+            return
+        show(describe_failure(error.with_traceback(trace)))
+
+    sys.excepthook = hook
