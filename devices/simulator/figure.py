@@ -1,4 +1,4 @@
-"""How a body's figure and skin differ from one capture to the next: weight, breath, clothes, skin that slides."""
+"""How a body differs from one capture to the next: weight, breath, clothes, skin that slides."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ def with_layer(model: BodyModel, bind: FloatArray, thickness_m: FloatArray) -> F
 def skin_slide(body: PosedBody, rng: np.random.Generator) -> FloatArray:
     """Tangential displacement (n, 3) of the skin over the posed body, metres.
 
-    Near a bent joint the skin is drawn along the limb by 3 to 8 mm for each 90 degrees of bend, and a little to the
-    side; linear-blend skinning does none of this. The field fades with the distance from the joint. The figure itself
-    must stay: put the result back onto the surface (`closest_on_surface` of the renderer).
+    Near a bent joint the skin is drawn along the limb by 3 to 8 mm for each 90 degrees of bend, and a little
+    to the side; linear-blend skinning does none of this. The field fades with the distance from the joint.
+    The figure itself must stay: put the result back onto the surface (`closest_on_surface` of the renderer).
     """
     model, v = body.model, body.vertices
     field = np.zeros_like(v)

@@ -31,7 +31,7 @@ class Marks:
         Axes in the skin's plane, in which the outline is drawn.
     radius_m : ndarray (k,)
     outline : ndarray (k, 3, 2)
-        Cosine and sine amplitudes of the second, third and fifth harmonic of the outline, as shares of the radius.
+        Cosine and sine amplitudes of the outline's second, third and fifth harmonic, shares of the radius.
     color, core : ndarray (k, 3)
         Linear reflectance at the rim and in the (off-centre) middle.
     opacity, softness : ndarray (k,)

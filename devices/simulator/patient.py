@@ -1,8 +1,9 @@
-"""A patient who exists only in numbers: a body with moles that comes to visits and stands before virtual cameras."""
+"""A patient who exists only in numbers: a body with moles that comes to visits and is photographed."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from zlib import crc32
@@ -10,22 +11,17 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from core.capture.camera import PinholeCamera
 from core.capture.rgbd import RgbdCapture
 from core.capture.transform import RigidTransform
 from core.errors import InputError
-from core.progress import Progress, no_progress
+from core.progress import Progress, ScaledProgress, no_progress
+from devices.camera import PreviewFrame
 from devices.simulator.body import PosedBody, load_body, pose_body, rotation_about
 from devices.simulator.figure import skin_slide, with_breath, with_layer, with_weight_change
 from devices.simulator.marks import Moles, areolae, make_moles, scatter_freckles, scatter_moles
-from devices.simulator.render import (
-    Actor,
-    Exposure,
-    Picture,
-    Stage,
-    closest_on_surface,
-    render_picture,
-    true_depth,
-)
+from devices.simulator.recording import capture_truth, depth_frames, framing_distance, sway_motions
+from devices.simulator.render import Exposure, Picture, render_picture
 from devices.simulator.room import (
     VIEW_TURN_DEG,
     Bystander,
@@ -35,24 +31,33 @@ from devices.simulator.room import (
     VisitChange,
     make_rig,
 )
-from devices.simulator.sensor import DEPTH_UNIT_M, FrameMaker, SensorView
+from devices.simulator.sensor import DEPTH_UNIT_M
 from devices.simulator.skin import Skin, Wardrobe, make_skin
+from devices.simulator.stage import Actor, Stage, closest_on_surface, room_depth, true_depth
 from devices.simulator.stances import Posture, take_stance
-from devices.simulator.truth import CaptureTruth, SimulatedCapture
+from devices.simulator.truth import SimulatedCapture
 
 FloatArray = NDArray[np.float64]
 
 _FIRST_VISIT = datetime(2026, 1, 12, 10, 15, tzinfo=UTC)
 _BETWEEN_VISITS = timedelta(days=91)
-_GRAZING_COSINE = 0.17
-_FRAME_SECONDS = 1.0 / 30.0
-_LAMP_FROM = (-0.45, -0.75, -0.50)
-_PATIENT_MARGIN_PX = 12
+_PREVIEW_WIDTH = 320
+_LAMP = np.array([-0.35, -0.80, -0.49])
 
 
 def _key(*words: object) -> list[int]:
     """Seed material from words and numbers, the same in every run."""
     return [word if isinstance(word, int) and word >= 0 else crc32(repr(word).encode()) for word in words]
+
+
+@dataclass(frozen=True, eq=False)
+class _Setup:
+    """The patient standing in the room."""
+
+    stage: Stage
+    depth_from_world: RigidTransform
+    joints_m: dict[str, FloatArray]
+    seed: int
 
 
 class SimulatedPatient:
@@ -156,7 +161,7 @@ class SimulatedPatient:
         return planned
 
     def posed(self, stance: str, visit: int, seed: int) -> PosedBody:
-        """The patient's body in a stance: figure of the visit, breath, clothes, skin slid over bent joints."""
+        """The patient's body in a stance: the visit's figure, breath, clothes, skin slid over joints."""
         natural, rng = self.variation, self._rng("pose", seed)
         bind = with_weight_change(self.model, self.model.bind, self._weight_change(visit))
         bind = with_breath(self.model, bind, float(rng.uniform(0.0, 1.0)) * natural.breath_m)
@@ -185,7 +190,7 @@ class SimulatedPatient:
         visit: int = 1,
         frames: int = 30,
         seed: int | None = None,
-        distance_m: float | None = 2.3,
+        distance_m: float | None = None,
         turn_deg: float = 0.0,
         joints: bool = False,
         *,
@@ -207,8 +212,8 @@ class SimulatedPatient:
             Depth frames.
         seed : int, optional
             Of everything that differs between two captures. Default: follows from visit, stance and view.
-        distance_m : float or None
-            Camera to the patient's axis. None: as far as needed to see the whole patient.
+        distance_m : float, optional
+            Camera to the patient's axis. Default: 2.3 m, or farther if the whole patient needs it.
         turn_deg : float
             Additional turn of the patient, toward the patient's own left.
         joints : bool
@@ -218,34 +223,17 @@ class SimulatedPatient:
         taken_at : datetime, optional
         progress : Progress
         """
-        if view not in VIEW_TURN_DEG:
-            raise InputError(
-                f"The simulated patient has no view '{view}'.", "Choose front, back, left or right."
-            )
-        if frames < 1 or visit < 1:
-            raise InputError("A simulated capture needs at least one frame, and visits are numbered from 1.")
-        seed = crc32(repr((visit, stance, view, turn_deg)).encode()) if seed is None else seed
-        body = self.posed(stance, visit, seed)
-        turn = rotation_about((0, 0, 1), np.deg2rad(VIEW_TURN_DEG[view] + turn_deg))
-        standing = body.vertices @ turn.T
-        distance_m = self._framing_distance(standing) if distance_m is None else distance_m
-        height = 0.5 * float(standing[:, 2].max()) if height_m is None else height_m
-        depth_from_world = self.room.depth_from_world(distance_m, height)
-        vertices = depth_from_world.apply(standing)
-        moles = self.moles(visit)
-        patient = Actor(self.model, vertices, self.skin, self._texture.joined(moles.marks))
-        lamp = -np.array(_LAMP_FROM) * (-1.0, 1.0, 1.0) / np.linalg.norm(_LAMP_FROM)
-        light = np.array([-lamp[0], -abs(lamp[1]), -abs(lamp[2])])
-        actors = [patient]
-        if self.room.bystander is not None:
-            actors.append(self._bystander(self.room.bystander, depth_from_world))
-        stage = Stage(actors, self.room.planes(depth_from_world), light)
+        if frames < 1:
+            raise InputError("A simulated capture needs at least one frame.")
+        setup = self._stand(stance, view, visit, seed, distance_m, turn_deg, height_m)
         progress(0.05, "Patient posed")
-        depth = self._frames(stage, frames, self._rng("frames", seed), depth_from_world, progress)
-        picture = self._picture(stage, visit, self._rng("picture", seed))
+        rng = self._rng("frames", setup.seed)
+        sway = self.variation.sway_m / self.model.stature_m
+        motions = sway_motions(frames, sway, setup.depth_from_world, rng)
+        depth = depth_frames(setup.stage, self.rig, motions, rng, ScaledProgress(progress, 0.05, 0.65))
+        picture = self._picture(setup.stage, self.rig.color, visit, self._rng("picture", setup.seed))
         progress(0.95, "Picture rendered")
-        joints_m = {name: depth_from_world.apply(turn @ p) for name, p in body.joints.items()}
-        truth = self._truth(stage, vertices, moles, picture, joints_m)
+        truth = capture_truth(setup.stage, self.rig.rig, self.moles(visit), picture, setup.joints_m)
         capture = RgbdCapture(
             depth,
             DEPTH_UNIT_M,
@@ -254,18 +242,70 @@ class SimulatedPatient:
             view=view,
             stance=stance,
             taken_at=taken_at or _FIRST_VISIT + (visit - 1) * _BETWEEN_VISITS,
-            joints_m=dict(joints_m) if joints else None,
+            joints_m=dict(setup.joints_m) if joints else None,
         )
         progress(1.0, "Captured")
         return SimulatedCapture(capture, truth)
 
-    def _framing_distance(self, standing: FloatArray) -> float:
-        camera = self.rig.sensor.camera
-        middle = 0.5 * standing[:, 2].max()
-        room_y = (camera.height / 2 - _PATIENT_MARGIN_PX) / camera.fy
-        room_x = (camera.width / 2 - _PATIENT_MARGIN_PX) / camera.fx
-        need = np.maximum(np.abs(standing[:, 2] - middle) / room_y, np.abs(standing[:, 0]) / room_x)
-        return float((need - standing[:, 1]).max())
+    def preview(
+        self,
+        stance: str = "psi",
+        view: str = "front",
+        visit: int = 1,
+        seed: int | None = None,
+        distance_m: float | None = None,
+        turn_deg: float = 0.0,
+    ) -> PreviewFrame:
+        """Small noiseless picture and depth for a viewfinder; the arguments are those of `capture`."""
+        setup = self._stand(stance, view, visit, seed, distance_m, turn_deg, None)
+        sensor, color = self.rig.sensor.camera, self.rig.color
+        cells = setup.stage.body_cells(sensor, RigidTransform())
+        room, _ = room_depth(setup.stage, sensor)
+        depth = true_depth(setup.stage, sensor, room, cells, RigidTransform())[0][::4, ::4]
+        share = _PREVIEW_WIDTH / color.width
+        small = replace(
+            color,
+            width=_PREVIEW_WIDTH,
+            height=round(color.height * share),
+            fx=color.fx * share,
+            fy=color.fy * share,
+            cx=(color.cx + 0.5) * share - 0.5,
+            cy=(color.cy + 0.5) * share - 0.5,
+        )
+        picture = self._picture(setup.stage, small, visit, self._rng("preview"))
+        return PreviewFrame(np.where(depth < 8.0, depth, np.float32(0)), picture.rgb)
+
+    def _stand(
+        self,
+        stance: str,
+        view: str,
+        visit: int,
+        seed: int | None,
+        distance_m: float | None,
+        turn_deg: float,
+        height_m: float | None,
+    ) -> _Setup:
+        if view not in VIEW_TURN_DEG:
+            raise InputError(
+                f"The simulated patient has no view '{view}'.", "Choose front, back, left or right."
+            )
+        if visit < 1:
+            raise InputError("Visits are numbered from 1.")
+        seed = crc32(repr((visit, stance, view, turn_deg)).encode()) if seed is None else seed
+        body = self.posed(stance, visit, seed)
+        turn = rotation_about((0, 0, 1), np.deg2rad(VIEW_TURN_DEG[view] + turn_deg))
+        standing = body.vertices @ turn.T
+        height = 0.5 * float(standing[:, 2].max()) if height_m is None else height_m
+        if distance_m is None:
+            distance_m = framing_distance(standing, self.rig, self.room, height)
+        depth_from_world = self.room.depth_from_world(distance_m, height)
+        marks = self._texture.joined(self.moles(visit).marks)
+        actors = [Actor(self.model, depth_from_world.apply(standing), self.skin, marks)]
+        if self.room.bystander is not None:
+            actors.append(self._bystander(self.room.bystander, depth_from_world))
+        stage = Stage(actors, self.room.planes(depth_from_world), _LAMP)
+        joints_m = {name: depth_from_world.apply(turn @ p) for name, p in body.joints.items()}
+        return _Setup(stage, depth_from_world, joints_m, seed)
 
     def _bystander(self, who: Bystander, depth_from_world: RigidTransform) -> Actor:
         model = load_body(who.shape)
@@ -277,117 +317,7 @@ class SimulatedPatient:
         world = body.vertices @ turn.T + (who.right_m, who.behind_m, 0.0)
         return Actor(model, depth_from_world.apply(world), skin, None)
 
-    def _frames(
-        self,
-        stage: Stage,
-        count: int,
-        rng: np.random.Generator,
-        depth_from_world: RigidTransform,
-        progress: Progress,
-    ) -> NDArray[np.uint16]:
-        sensor = self.rig.sensor
-        camera = sensor.camera
-        cells = stage.body_cells(camera, RigidTransform())
-        depth, hits, pixels = true_depth(stage, camera, cells, RigidTransform())
-        rays = camera.pixel_rays.reshape(-1, 3)
-        _, which = stage.plane_hits(np.zeros(3), rays)
-        normals = np.zeros((len(rays), 3))
-        for k, plane in enumerate(stage.planes):
-            normals[which == k] = plane.normal
-        body = hits.t <= depth.ravel()[pixels] + 1e-6
-        normals[pixels[body]] = hits.normal[body]
-        length = np.maximum(np.linalg.norm(normals, axis=1) * np.linalg.norm(rays, axis=1), 1e-9)
-        cosine = np.abs((normals * rays).sum(axis=1)) / length
-        flat = depth.ravel().astype(float)
-        seen = np.flatnonzero(np.isfinite(flat))
-        shadow = np.zeros(len(rays), bool)
-        projector = np.array([sensor.baseline_m, 0.0, 0.0])
-        shadow[seen] = stage.blocked(projector, rays[seen] * flat[seen, None], 0.004)
-        shape = depth.shape
-        view = SensorView(cosine.reshape(shape).astype(np.float32), shadow.reshape(shape))
-        maker = FrameMaker(sensor, view, self.rig.device_seed, rng)
-        out = np.empty((count, *shape), np.uint16)
-        for k, motion in enumerate(self._sway(count, rng, depth_from_world)):
-            moved = true_depth(stage, camera, cells, motion)[0] if self.variation.sway_m > 0 else depth
-            out[k] = maker.frame(moved)
-            progress(0.05 + 0.6 * (k + 1) / count, f"Frame {k + 1} of {count}")
-        return out
-
-    def _sway(
-        self, count: int, rng: np.random.Generator, depth_from_world: RigidTransform
-    ) -> list[RigidTransform]:
-        """Motion of the patient in each frame: an inverted pendulum about the ankles, zero in the mean."""
-        keep = np.exp(-_FRAME_SECONDS / 0.4)
-        angles = np.zeros((count, 2))
-        state = rng.normal(size=2)
-        for k in range(count):
-            angles[k] = state
-            state = keep * state + np.sqrt(1 - keep**2) * rng.normal(size=2)
-        if count > 1:
-            angles -= angles.mean(axis=0)
-        else:
-            angles[:] = 0.0
-        angles *= self.variation.sway_m / self.model.stature_m
-        ankles = depth_from_world.apply(np.array([0.0, 0.0, 0.08]))
-        motions = []
-        for forward, sideways in angles:
-            axis = depth_from_world.rotate(np.array([forward, sideways, 0.0]))
-            angle = float(np.linalg.norm(axis))
-            rotation = rotation_about(axis, angle) if angle > 0 else np.eye(3)
-            motions.append(RigidTransform(rotation, ankles - rotation @ ankles))
-        return motions
-
-    def _picture(self, stage: Stage, visit: int, rng: np.random.Generator) -> Picture:
-        gain = self._rng("light", visit).normal(1.0, 0.03, 3) * 1.12
+    def _picture(self, stage: Stage, camera: PinholeCamera, visit: int, rng: np.random.Generator) -> Picture:
+        gain = self._rng("light", visit).normal(1.0, 0.03, 3) * 1.3
         exposure = Exposure((float(gain[0]), float(gain[1]), float(gain[2])))
-        return render_picture(stage, self.rig.color, self.rig.color_from_depth, exposure, rng)
-
-    def _truth(
-        self,
-        stage: Stage,
-        vertices: FloatArray,
-        moles: Moles,
-        picture: Picture,
-        joints_m: dict[str, FloatArray],
-    ) -> CaptureTruth:
-        marks, model, rig = moles.marks, self.model, self.rig.rig
-        corners = vertices[model.triangles[marks.triangle]]
-        points = np.einsum("kc,kcx->kx", marks.barycentric, corners)
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        depth_of = {}
-        for name in ("cloth", "hair"):
-            values = getattr(self.skin, name)[model.triangles[marks.triangle]]
-            depth_of[name] = (values * marks.barycentric).sum(axis=1)
-        bare = (depth_of["cloth"] < -marks.radius_m) & (depth_of["hair"] < -marks.radius_m)
-
-        def sees(eye: FloatArray) -> NDArray[np.bool_]:
-            toward = eye - points
-            toward /= np.linalg.norm(toward, axis=1, keepdims=True)
-            facing = (normal * toward).sum(axis=1) > _GRAZING_COSINE
-            return bare & facing & ~stage.blocked(eye, points, 0.003)
-
-        pixels, depth_pixels = rig.project_to_picture(points), rig.depth.project(points)
-        in_color = sees(rig.picture_from_depth.inverse().translation) & rig.picture_camera.contains(
-            pixels, 1.0
-        )
-        in_depth = sees(np.zeros(3)) & rig.depth.contains(depth_pixels, 1.0)
-        pixels[~in_color], depth_pixels[~in_depth] = np.nan, np.nan
-        return CaptureTruth(
-            rig=rig,
-            vertices_m=vertices,
-            triangles=model.triangles,
-            pixel_numbers=picture.pixels,
-            pixel_triangle=picture.triangle,
-            pixel_uv=picture.uv,
-            joints_m=joints_m,
-            mole_ids=moles.ids,
-            mole_triangle=marks.triangle,
-            mole_barycentric=marks.barycentric,
-            mole_points_m=points,
-            mole_pixels=pixels,
-            mole_depth_pixels=depth_pixels,
-            mole_visible_color=in_color,
-            mole_visible_depth=in_depth,
-            mole_radius_m=marks.radius_m,
-        )
+        return render_picture(stage, camera, self.rig.color_from_depth, exposure, rng)

@@ -1,13 +1,8 @@
-"""Ray casting: true depth and colour pictures of people in a room, with what every pixel shows.
-
-Everything is in the depth camera's frame (x right, y down, z forward, metres).
-"""
+"""Colour pictures of people in a room, with what every pixel shows."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -15,224 +10,15 @@ from numpy.typing import NDArray
 
 from core.capture.camera import PinholeCamera
 from core.capture.transform import RigidTransform
-from devices.simulator.body import BodyModel, vertex_normals
-from devices.simulator.marks import Marks
-from devices.simulator.skin import Skin, linear
+from devices.simulator.body import BodyModel
+from devices.simulator.skin import linear
+from devices.simulator.stage import Actor, Hits, Stage
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
-_CELL = 8
 _CHUNK = 131_072
-
-
-def closest_on_surface(vertices: FloatArray, triangles: NDArray[np.int32], points: FloatArray) -> FloatArray:
-    """Nearest places (k, 3) on a mesh."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(triangles.astype(np.uint32))
-    )
-    found = scene.compute_closest_points(o3d.core.Tensor(points.astype(np.float32)))
-    return np.asarray(found["points"].numpy(), float)
-
-
-@dataclass(frozen=True, eq=False)
-class Actor:
-    """A person in the room.
-
-    Attributes
-    ----------
-    model : BodyModel
-    vertices : ndarray (n, 3)
-    skin : Skin
-    marks : Marks or None
-    """
-
-    model: BodyModel
-    vertices: FloatArray
-    skin: Skin
-    marks: Marks | None
-
-
-@dataclass(frozen=True, eq=False)
-class Plane:
-    """Wall or floor: ``normal . x = offset``, with its colour (linear reflectance)."""
-
-    normal: FloatArray
-    offset: float
-    color: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Hits:
-    """What rays met, one row per ray.
-
-    Attributes
-    ----------
-    t : ndarray (k,) float32
-        Ray parameter, inf where nothing was met.
-    actor : ndarray (k,) int8
-        -1 where nothing was met.
-    triangle : ndarray (k,) int32
-        Triangle of that actor's body model.
-    uv : ndarray (k, 2) float32
-        Weights of the triangle's second and third corner.
-    normal : ndarray (k, 3) float32
-        Of the triangle.
-    """
-
-    t: Image
-    actor: NDArray[np.int8]
-    triangle: NDArray[np.int32]
-    uv: Image
-    normal: Image
-
-
-class Stage:
-    """People in a room, ready to be looked at.
-
-    Parameters
-    ----------
-    actors : sequence of Actor
-        The patient first.
-    planes : sequence of Plane
-        Floor and walls; they cut off what lies behind but cast no shadow.
-    light : ndarray (3,)
-        Unit vector toward the main lamp.
-    """
-
-    def __init__(self, actors: Sequence[Actor], planes: Sequence[Plane], light: FloatArray) -> None:
-        import open3d as o3d
-
-        self.actors, self.planes, self.light = list(actors), list(planes), light
-        self._o3d: Any = o3d
-        self._scene: Any = o3d.t.geometry.RaycastingScene(nthreads=2)
-        vertices, faces, owner, number, offset = [], [], [], [], 0
-        for k, actor in enumerate(self.actors):
-            outer = actor.model.outer
-            vertices.append(actor.vertices)
-            faces.append(actor.model.triangles[outer] + offset)
-            owner.append(np.full(len(outer), k, np.int8))
-            number.append(outer.astype(np.int32))
-            offset += len(actor.vertices)
-        self._scene.add_triangles(
-            o3d.core.Tensor(np.concatenate(vertices).astype(np.float32)),
-            o3d.core.Tensor(np.concatenate(faces).astype(np.uint32)),
-        )
-        self._owner, self._number = np.concatenate(owner), np.concatenate(number)
-        self._attributes = [self._vertex_attributes(actor) for actor in self.actors]
-
-    def cast(self, origin: FloatArray, directions: NDArray[np.floating]) -> Hits:
-        """Cast rays from one origin (3,) or many (k, 3) along directions (k, 3)."""
-        rays = np.empty((len(directions), 6), np.float32)
-        rays[:, :3], rays[:, 3:] = origin, directions
-        found = self._scene.cast_rays(self._o3d.core.Tensor(rays))
-        t = found["t_hit"].numpy()
-        hit = np.isfinite(t)
-        primitive = np.where(hit, found["primitive_ids"].numpy(), 0)
-        return Hits(
-            t,
-            np.where(hit, self._owner[primitive], np.int8(-1)),
-            self._number[primitive],
-            found["primitive_uvs"].numpy(),
-            found["primitive_normals"].numpy(),
-        )
-
-    def blocked(self, origins: FloatArray, targets: FloatArray, slack_m: float) -> BoolArray:
-        """Whether a person stands between origins (3,) or (k, 3) and targets (k, 3), ending ``slack_m`` before them."""
-        d = targets - origins
-        length = np.linalg.norm(d, axis=1)
-        t = self.cast(origins, d / np.maximum(length, 1e-9)[:, None]).t
-        return np.asarray(t < length - slack_m)
-
-    def plane_hits(
-        self, origin: FloatArray, directions: NDArray[np.floating]
-    ) -> tuple[Image, NDArray[np.int8]]:
-        """Ray parameter (k,) of the nearest plane (inf: none) and its number (-1: none)."""
-        best = np.full(len(directions), np.inf, np.float32)
-        which = np.full(len(directions), -1, np.int8)
-        for k, plane in enumerate(self.planes):
-            speed = directions @ plane.normal.astype(directions.dtype)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                t = ((plane.offset - plane.normal @ origin) / speed).astype(np.float32)
-            nearer = (t > 0) & (t < best)
-            best[nearer], which[nearer] = t[nearer], k
-        return best, which
-
-    def body_cells(
-        self, camera: PinholeCamera, camera_from_depth: RigidTransform, margin: int = 2
-    ) -> BoolArray:
-        """Image (h, w) that covers every pixel in which a person may appear, with a margin in cells of 8 pixels."""
-        h, w = -(-camera.height // _CELL), -(-camera.width // _CELL)
-        cells = np.zeros((h, w), np.uint8)
-        for actor in self.actors:
-            corners = actor.vertices[actor.model.triangles]
-            points = np.concatenate([actor.vertices, corners.mean(axis=1)])
-            points = np.concatenate([points, 0.5 * (corners[:, 0] + corners[:, 1])])
-            pixels = camera.project(camera_from_depth.apply(points))
-            q = np.rint(np.nan_to_num(pixels, nan=-1e6) / _CELL).astype(np.int64)
-            inside = (q >= -1).all(axis=1) & (q[:, 0] <= w) & (q[:, 1] <= h)
-            cells[np.clip(q[inside, 1], 0, h - 1), np.clip(q[inside, 0], 0, w - 1)] = 1
-        size = 2 * margin + 1
-        cells = cv2.dilate(cells, np.ones((size, size), np.uint8))
-        return np.kron(cells, np.ones((_CELL, _CELL), np.uint8))[: camera.height, : camera.width] > 0
-
-    def _vertex_attributes(self, actor: Actor) -> Image:
-        """Canonical place 3, normal 3, openness 1, skin 3, cloth 1, cloth colour 3, hair 1: (n, 15)."""
-        normals = vertex_normals(actor.vertices, actor.model.triangles)
-        return np.column_stack(
-            [
-                actor.model.reference,
-                normals,
-                self._openness(actor.vertices, normals),
-                actor.skin.albedo,
-                actor.skin.cloth,
-                actor.skin.cloth_albedo,
-                actor.skin.hair,
-            ]
-        ).astype(np.float32)
-
-    def _openness(self, vertices: FloatArray, normals: FloatArray) -> FloatArray:
-        """Share (n,) of the hemisphere above each vertex that nobody hides within half a metre."""
-        rng = np.random.default_rng(7)
-        count = 24
-        random = rng.normal(size=(count, 3))
-        random /= np.linalg.norm(random, axis=1, keepdims=True)
-        free = np.zeros(len(vertices))
-        start = vertices + 0.003 * normals
-        for direction in random:
-            d = normals + 0.98 * direction
-            d /= np.linalg.norm(d, axis=1, keepdims=True)
-            t = self.cast(start, d).t
-            free += np.clip(t / 0.5, 0.0, 1.0)
-        return free / count
-
-    def interpolate(self, hits: Hits, rows: NDArray[np.int64], actor: int) -> Image:
-        """Vertex attributes (k, 15) at hits on one actor."""
-        corners = self.actors[actor].model.triangles[hits.triangle[rows]]
-        table = self._attributes[actor]
-        u, v = hits.uv[rows, :1], hits.uv[rows, 1:]
-        out = table[corners[:, 1]]
-        out *= u
-        out += table[corners[:, 2]] * v
-        out += table[corners[:, 0]] * (1.0 - u - v)
-        return np.asarray(out)
-
-
-def true_depth(
-    stage: Stage, camera: PinholeCamera, cells: BoolArray, motion: RigidTransform
-) -> tuple[Image, Hits, NDArray[np.int64]]:
-    """Depth (h, w) of people (moved by ``motion``) and room; also the hits and their flat pixel numbers."""
-    rays = camera.pixel_rays.reshape(-1, 3)
-    pixels = np.flatnonzero(cells)
-    back = motion.inverse()
-    hits = stage.cast(back.apply(np.zeros(3)), back.rotate(rays[pixels]))
-    depth, _ = stage.plane_hits(np.zeros(3), rays)
-    depth[pixels] = np.minimum(depth[pixels], hits.t)
-    return depth.reshape(camera.height, camera.width), hits, pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +43,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Exposure:
-    """How the colour camera renders light: gain per channel, noise (share of full scale) and blur in pixels."""
+    """How the colour camera renders light: gain per channel, noise (of full scale), blur in pixels."""
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     noise: float = 0.010
@@ -297,12 +83,12 @@ def render_picture(
         if len(rows):
             flat[pixels[rows]] = _paint(stage, k, hits, rows, directions, sampled, pixels, color_from_depth)
     flat *= np.asarray(exposure.gain, np.float32)
-    np.power(np.clip(canvas, 0.0, 1.0, out=canvas), np.float32(1 / 2.2), out=canvas)
+    canvas = cv2.pow(np.clip(canvas, 0.0, 1.0, out=canvas), 1 / 2.2)
     if fine > 1:
         canvas = cv2.resize(canvas, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     canvas = cv2.GaussianBlur(canvas, (0, 0), exposure.blur_px)
     noise = rng.standard_normal(canvas.shape, dtype=np.float32)
-    rgb = np.clip(255.0 * (canvas + exposure.noise * noise) + 0.5, 0, 255).astype(np.uint8)
+    rgb = cv2.convertScaleAbs(np.maximum(canvas + np.float32(exposure.noise) * noise, 0.0), alpha=255.0)
     return _with_truth(rgb, seen & (hits.actor == 0), hits, pixels, sampled.width, fine)
 
 
@@ -323,29 +109,37 @@ def _with_truth(
 
 
 def _background(stage: Stage, camera: PinholeCamera, depth_from_color: RigidTransform) -> Image:
-    """Linear colour (h, w, 3) of the empty room with soft shadows of the people, painted small and enlarged."""
+    """Linear colour (h, w, 3) of the empty room with soft shadows of the people.
+
+    Every plane is shaded on a small grid and enlarged; the edge between planes is found at full size from
+    the inverse distance, which is linear over the picture.
+    """
     shrink = max(1, camera.width // 640)
-    w, h = camera.width // shrink, camera.height // shrink
+    w, h = -(-camera.width // shrink), -(-camera.height // shrink)
     u, v = np.meshgrid(np.arange(w) * shrink + (shrink - 1) / 2, np.arange(h) * shrink + (shrink - 1) / 2)
     rays = depth_from_color.rotate(camera.rays(np.stack([u.ravel(), v.ravel()], axis=1)))
     origin = depth_from_color.translation
-    t, which = stage.plane_hits(origin, rays)
-    small = np.empty((h * w, 3), np.float32)
-    small[:] = linear((0.55, 0.57, 0.58))
-    hit = which >= 0
-    points = origin + rays[hit] * t[hit, None]
-    lit = np.ones(h * w, np.float32)
-    lit[hit] -= stage.blocked(points, points + 3.0 * stage.light, 0.0)
-    lit = cv2.GaussianBlur(lit.reshape(h, w), (0, 0), 9.0 * w / 640).ravel()
-    for k, plane in enumerate(stage.planes):
-        rows = np.flatnonzero(which == k)
-        p = origin + rays[rows] * t[rows, None]
-        fall = 1.0 / (1.0 + 0.05 * ((p - p.mean(axis=0)) ** 2).sum(axis=1)) if len(rows) else 1.0
-        small[rows] = plane.color * (fall * (0.78 + 0.22 * lit[rows]))[:, None]
-    picture = cv2.resize(
-        small.reshape(h, w, 3), (camera.width, camera.height), interpolation=cv2.INTER_LINEAR
-    )
-    return np.asarray(picture, np.float32)
+    size = (w * shrink, h * shrink)
+    nearest = np.full((camera.height, camera.width), 1e-3, np.float32)
+    picture = np.empty((camera.height, camera.width, 3), np.float32)
+    picture[:] = linear((0.55, 0.57, 0.58))
+    for plane in stage.planes:
+        inverse = (rays @ plane.normal / (plane.offset - plane.normal @ origin)).astype(np.float32)
+        rows = np.flatnonzero(inverse > 0.02)
+        points = origin + rays[rows] / inverse[rows, None]
+        lit = np.ones(h * w, np.float32)
+        lit[rows] -= stage.blocked(points, points + 3.0 * stage.light, 0.0)
+        lit = cv2.GaussianBlur(lit.reshape(h, w), (0, 0), 12.0 * w / 640).ravel()
+        small = np.tile(plane.color.astype(np.float32), (h * w, 1))
+        fall = 1.0 / (1.0 + 0.04 * (points[:, 0] ** 2 + (points[:, 2] - 3.0) ** 2))
+        small[rows] *= (fall * (0.82 + 0.18 * lit[rows]))[:, None].astype(np.float32)
+        shaded = cv2.resize(small.reshape(h, w, 3), size, interpolation=cv2.INTER_LINEAR)
+        closeness = cv2.resize(inverse.reshape(h, w), size, interpolation=cv2.INTER_LINEAR)
+        closeness = closeness[: camera.height, : camera.width]
+        front = (closeness > nearest).view(np.uint8)
+        cv2.copyTo(shaded[: camera.height, : camera.width], front, picture)
+        cv2.copyTo(closeness, front, nearest)
+    return picture
 
 
 def _paint(
@@ -415,12 +209,12 @@ def _paint_marks(
     corners = person.vertices[person.model.triangles[marks.triangle]]
     points = color_from_depth.apply(np.einsum("kc,kcx->kx", marks.barycentric, corners))
     centre = camera.project(points)
-    index = np.full(camera.height * camera.width, -1, np.int32)
-    index[pixels[rows]] = np.arange(len(rows), dtype=np.int32)
-    index = index.reshape(camera.height, camera.width)
+    numbers = np.full(camera.height * camera.width, -1, np.int32)
+    numbers[pixels[rows]] = np.arange(len(rows), dtype=np.int32)
+    index = numbers.reshape(camera.height, camera.width)
     for k in np.flatnonzero(camera.contains(centre)):
         reach = int(1.9 * marks.radius_m[k] * camera.fx / points[k, 2]) + 2
-        u, v = int(round(centre[k, 0])), int(round(centre[k, 1]))
+        u, v = (int(x) for x in np.rint(centre[k]))
         window = index[max(v - reach, 0) : v + reach + 1, max(u - reach, 0) : u + reach + 1]
         touched = window[window >= 0]
         if len(touched) == 0:

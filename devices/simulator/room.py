@@ -1,6 +1,7 @@
 """The consulting room: where patient, camera, walls and other people stand.
 
-World frame: x to the right as the camera sees it, y away from the camera, z up, origin on the floor under the patient.
+World frame: x to the right as the camera sees it, y away from the camera, z up; the origin is on the floor
+under the patient.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
 from core.errors import InputError
 from devices.simulator.body import rotation_about
-from devices.simulator.render import Plane
 from devices.simulator.sensor import DepthSensor
 from devices.simulator.skin import linear
+from devices.simulator.stage import Plane
 
 FloatArray = NDArray[np.float64]
 
@@ -125,8 +126,8 @@ def make_rig(
 ) -> SimulatedRig:
     """Virtual Kinect with its own 640x480 colour camera, or with an auxiliary camera of any other size.
 
-    The Kinect's colour camera sits 25 mm beside the infrared camera, parallel. The auxiliary camera is mounted 25 to
-    60 mm away and up to about a degree askew, differently for every ``device_seed``.
+    The Kinect's colour camera sits 25 mm beside the infrared camera, parallel. The auxiliary camera is
+    mounted 25 to 60 mm away and up to about a degree askew, differently for every ``device_seed``.
     """
     width, height = color_size
     if width < 16 or height < 16:

@@ -1,8 +1,8 @@
 """Noise of a structured-light depth camera (Kinect v1): what turns true depth into raw frames.
 
-Axial noise follows Nguyen, Izadi and Lovell (3DIMPVT 2012); the range is quantised in disparity (1/8 pixel), pixels
-drop out at grazing angles, at silhouettes and in the projector's shadow, and every device carries a fixed calibration
-ripple that no averaging over frames removes.
+Axial noise follows Nguyen, Izadi and Lovell (3DIMPVT 2012); the range is quantised in disparity (1/8
+pixel), pixels drop out at grazing angles, at silhouettes and in the projector's shadow, and every device
+carries a fixed calibration ripple that no averaging over frames removes.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ Image = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 
 DEPTH_UNIT_M = 0.001
+_FAR = np.float32(20.0)
+KINECT_DEPTH = PinholeCamera(640, 480, 575.816, 575.816, 319.5, 239.5)
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,13 @@ class DepthSensor:
     lateral_px : float
         Standard deviation of the sideways uncertainty of a pixel.
     ripple_px : tuple of float
-        RMS of the device's fixed disparity error, long waves and short waves. At distance z one pixel of disparity
-        is z^2 / (f b) metres: 0.12 m at 2.3 m.
+        RMS of the device's fixed disparity error, long waves and short waves. At distance z one pixel of
+        disparity is z^2 / (f b) metres: 0.12 m at 2.3 m.
     near_m, far_m : float
         Range outside of which nothing is measured.
     """
 
-    camera: PinholeCamera = PinholeCamera(640, 480, 575.816, 575.816, 319.5, 239.5)
+    camera: PinholeCamera = KINECT_DEPTH
     baseline_m: float = 0.075
     disparity_step_px: float = 0.125
     lateral_px: float = 0.8
@@ -51,7 +53,7 @@ class DepthSensor:
     far_m: float = 8.0
 
     def axial_sigma(self, z_m: NDArray[np.floating], incidence_rad: NDArray[np.floating] | float) -> Image:
-        """Standard deviation in metres of one depth reading, quantisation included (Nguyen 2012, eq. 3 and 4)."""
+        """Standard deviation of one depth reading in metres, quantisation included (Nguyen 2012, eq. 3)."""
         z = np.asarray(z_m, np.float32)
         angle = np.minimum(np.asarray(incidence_rad, np.float32), 1.5)
         tilted = 0.0001 / np.sqrt(np.maximum(z, 0.1)) * angle**2 / (np.pi / 2 - angle) ** 2
@@ -95,12 +97,15 @@ class SensorView:
 
     Attributes
     ----------
+    depth_m : ndarray (h, w)
+        True depth with the patient in the middle of the sway; the noise is set by it.
     cosine : ndarray (h, w)
         Of the angle between the surface normal and the line of sight.
     shadow : ndarray (h, w) bool
         Seen by the camera but not by the projector.
     """
 
+    depth_m: Image
     cosine: Image
     shadow: BoolArray
 
@@ -123,28 +128,27 @@ class FrameMaker:
         self._sensor, self._rng = sensor, rng
         self._ripple = device_ripple(sensor, device_seed)
         self._shadow = view.shadow
-        self._incidence = np.arccos(np.clip(view.cosine, 1e-3, 1.0)).astype(np.float32)
-        self._grazing = np.clip((np.rad2deg(self._incidence) - 68.0) / 15.0, 0.0, 1.0).astype(np.float32)
+        incidence = np.arccos(np.clip(view.cosine, 1e-3, 1.0)).astype(np.float32)
+        self._grazing = np.clip((np.rad2deg(incidence) - 68.0) / 15.0, 0.0, 1.0).astype(np.float32)
+        total = sensor.axial_sigma(np.minimum(view.depth_m, _FAR), incidence)
+        step = sensor.quantisation_step(np.minimum(view.depth_m, _FAR))
+        self._sigma = np.sqrt(np.maximum(total**2 - step**2 / 12.0, (0.3 * total) ** 2))
         h, w = sensor.camera.height, sensor.camera.width
         self._u, self._v = np.meshgrid(np.arange(w, dtype=np.float32), np.arange(h, dtype=np.float32))
         self._kernel = np.ones((3, 3), np.uint8)
 
     def frame(self, true_depth_m: Image) -> NDArray[np.uint16]:
-        """One raw frame in units of `DEPTH_UNIT_M`, 0 = no measurement, of true depth (h, w), inf = nothing there."""
+        """One raw frame in `DEPTH_UNIT_M`, 0 for no measurement, of true depth (h, w), inf for nothing."""
         s, rng = self._sensor, self._rng
-        far = np.float32(20.0)
-        z = np.minimum(true_depth_m, far)
+        z = np.minimum(true_depth_m, _FAR)
         shape = (z.shape[0], z.shape[1])
         u = self._u + s.lateral_px * _correlated_noise(rng, shape, 1.0)
         v = self._v + s.lateral_px * _correlated_noise(rng, shape, 1.0)
         nearest = cv2.remap(z, u, v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
         smooth = cv2.remap(z, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         z_seen = np.where(np.abs(smooth - nearest) < 0.05, smooth, nearest)
-        total = s.axial_sigma(z_seen, self._incidence)
-        step = s.quantisation_step(z_seen)
-        sigma = np.sqrt(np.maximum(total**2 - step**2 / 12.0, (0.3 * total) ** 2))
         grain = 0.6 * rng.standard_normal(shape, dtype=np.float32) + 0.8 * _correlated_noise(rng, shape, 1.2)
-        noisy = np.maximum(z_seen + sigma * grain, 0.2)
+        noisy = np.maximum(z_seen + self._sigma * grain, 0.2)
         focal_baseline = s.camera.fx * s.baseline_m
         disparity = (
             np.rint((focal_baseline / noisy + self._ripple) / s.disparity_step_px) * s.disparity_step_px
@@ -153,5 +157,5 @@ class FrameMaker:
         jump = cv2.morphologyEx(z, cv2.MORPH_GRADIENT, self._kernel) > 0.05
         chance = rng.random(shape, dtype=np.float32)
         lost = (chance < self._grazing) | (jump & (chance < 0.45)) | (chance < 0.001) | self._shadow
-        lost |= (measured > s.far_m) | (measured < s.near_m) | (nearest >= far)
+        lost |= (measured > s.far_m) | (measured < s.near_m) | (nearest >= _FAR)
         return np.where(lost, 0, np.rint(measured / DEPTH_UNIT_M)).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""What the skin of a simulated patient looks like: complexion, clothes, hair, face, at the vertices of the body."""
+"""What a simulated patient looks like: complexion, clothes, hair and face, at the vertices of the body."""
 
 from __future__ import annotations
 

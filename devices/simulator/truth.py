@@ -41,8 +41,8 @@ _ARRAYS = (
 class CaptureTruth:
     """Truth of one simulated capture. Positions are in the depth camera's frame, metres.
 
-    A place on the skin is a triangle of the body mesh with barycentric weights: the same numbers are the same place in
-    every stance, view and visit of a patient.
+    A place on the skin is a triangle of the body mesh with barycentric weights: the same numbers are the same
+    place in every stance, view and visit of a patient.
 
     Attributes
     ----------
@@ -51,8 +51,8 @@ class CaptureTruth:
         The patient's skin (over clothes and hair: their surface) in the middle of the capture.
     triangles : ndarray (m, 3) int32
     pixel_numbers : ndarray (k,) int32
-        Flat numbers, ascending, of the picture's pixels that show the patient; `pixel_triangle` (k,) and `pixel_uv`
-        (k, 2), the weights of the second and third corner, say which place at the pixel's centre.
+        Flat numbers, ascending, of the picture's pixels that show the patient; `pixel_triangle` (k,) and
+        `pixel_uv` (k, 2), the weights of the second and third corner, say which place at the pixel's centre.
     joints_m : dict of str to ndarray (3,)
         The 15 joints, interior, the subject's own left and right.
     mole_ids : tuple of str
@@ -120,7 +120,7 @@ class CaptureTruth:
         return np.asarray((corners * np.asarray(barycentric)[..., None]).sum(axis=-2))
 
     def surface_point_at(self, pixel: ArrayLike) -> SurfacePoint | None:
-        """Skin shown at a picture pixel (u, v), sub-pixel; None where the picture does not show the patient."""
+        """Skin shown at a picture pixel (u, v), sub-pixel; None off the patient."""
         camera = self.rig.picture_camera
         u, v = (float(x) for x in np.asarray(pixel, float))
         if not camera.contains([[u, v]])[0]:
