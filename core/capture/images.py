@@ -1,4 +1,4 @@
-"""Reading and writing the image files of a capture, strictly: a damaged or foreign file is never half-read."""
+"""Reading and writing the image files of a capture: a damaged or foreign file is never half-read."""
 
 from __future__ import annotations
 

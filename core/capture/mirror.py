@@ -1,4 +1,4 @@
-"""Un-mirroring: a mirrored recording swaps the patient's left and right, so it is mended before anything else."""
+"""Un-mirroring: a mirrored recording swaps the patient's left and right, so it is mended first."""
 
 from __future__ import annotations
 

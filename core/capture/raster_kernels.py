@@ -1,4 +1,4 @@
-"""Compiled z-buffer of a depth grid seen from another camera. Imported only when used: numba is slow to load."""
+"""Compiled z-buffer of a depth grid seen from another camera. Imported only when used."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def draw_grid(
 ) -> None:
     """Draw the quads of a depth grid (h, w) into a z-buffer ``out`` of the other camera (0 = nothing).
 
-    ``pixels`` (h, w, 2) and ``seen_depth`` (h, w) say where each grid point lies in the other camera. Quads across
-    a depth jump are not drawn; single points are, so that nothing measured is lost.
+    ``pixels`` (h, w, 2) and ``seen_depth`` (h, w) say where each grid point lies in the other camera. Quads
+    across a depth jump are not drawn; single points are, so that nothing measured is lost.
     """
     h, w = depth.shape
     height, width = out.shape

@@ -1,4 +1,4 @@
-"""Colour-depth registration (thesis eq. 2 to 4): depth as the colour camera sees it, and colour on the depth grid."""
+"""Colour-depth registration (thesis eq. 2 to 4): depth seen by the colour camera, colour on depth."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from core.errors import InputError
 def register_depth_to_color(depth_m: FloatArray, rig: CameraRig, *, jump_m: float = 0.05) -> FloatArray:
     """The depth image as the colour camera would measure it.
 
-    Each depth pixel becomes a point (eq. 3), moves into the colour camera's frame (the inverse of eq. 4) and is
-    projected (eq. 2). The grid is drawn as a surface, so that a colour image of more pixels has no holes; the nearest
-    surface wins.
+    Each depth pixel becomes a point (eq. 3), moves into the colour camera's frame (the inverse of eq. 4) and
+    is projected (eq. 2). The grid is drawn as a surface, so that a colour image of more pixels has no holes;
+    the nearest surface wins.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def register_color_to_depth(
     colors : ndarray (h, w, 3) uint8
         RGB, black where unknown.
     known : ndarray (h, w) bool
-        Whether the pixel has depth, projects into the colour image, and is not hidden from the colour camera by
-        something more than ``tolerance_m`` nearer.
+        Whether the pixel has depth, projects into the colour image, and is not hidden from the colour camera
+        by something more than ``tolerance_m`` nearer.
     """
     camera = rig.color
     if camera is None:

@@ -118,8 +118,8 @@ class RgbdCapture:
             expected = (self.rig.color.height, self.rig.color.width, 3)
             if self.color.shape != expected or self.color.dtype != np.uint8:
                 raise InputError(
-                    f"The colour image is {self.color.shape[1]} x {self.color.shape[0]} pixels, but the colour "
-                    f"camera says {self.rig.color.width} x {self.rig.color.height}."
+                    f"The colour image is {self.color.shape[1]} x {self.color.shape[0]} pixels, but the "
+                    f"colour camera says {self.rig.color.width} x {self.rig.color.height}."
                 )
 
     def with_joints(self, joints_m: dict[str, FloatArray] | None) -> RgbdCapture:

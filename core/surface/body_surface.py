@@ -29,8 +29,8 @@ _SMALLEST_PART = 60
 class BodySurface:
     """Triangles over neighbouring depth pixels, in the depth camera's frame. Immutable.
 
-    Every edge has at most two triangles and every vertex one fan of them: it is a surface with rim, possibly in
-    several parts.
+    Every edge has at most two triangles and every vertex one fan of them: it is a surface with rim, possibly
+    in several parts.
 
     Attributes
     ----------

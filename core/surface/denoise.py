@@ -1,4 +1,4 @@
-"""Edge-preserving smoothing of a depth image, without which noise lengthens every geodesic (METHOD section 2)."""
+"""Edge-preserving smoothing of a depth image, for noise lengthens every geodesic (METHOD section 2)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def denoise_depth(depth_m: FloatArray, *, sigma_px: float = 1.5, gate_m: float =
     sigma_px : float
         Standard deviation of the neighbours' Gaussian weights.
     gate_m : float
-        Neighbours that differ by more in depth do not count, so that an arm does not melt into the torso behind it.
+        Neighbours that differ by more in depth do not count, so that an arm does not melt into the torso
+        behind it.
     """
     from core.surface.depth_kernels import fit_planes
 

@@ -17,8 +17,9 @@ def fuse_frames(
 ) -> None:
     """Robust mean and standard deviation of each pixel over the frames, in raw units.
 
-    Values within ``gate`` of the median count; a pixel needs ``least`` of them. The median is found by bisection on
-    the value, a whole row at a time: every inner loop is free of branches and runs in vector instructions.
+    Values within ``gate`` of the median count; a pixel needs ``least`` of them. The median is found by
+    bisection on the value, a whole row at a time: every inner loop is free of branches and runs in vector
+    instructions.
     """
     n, height, width = frames.shape
     for row in prange(height):
@@ -37,7 +38,7 @@ def fuse_frames(
         for x in range(width):
             half[x] = zeros[x] + (n - zeros[x] + 1) // 2
             if zeros[x] < n:
-                widest = max(widest, np.int64(high[x]) - np.int64(low[x]))
+                widest = max(widest, int(high[x]) - int(low[x]))
             else:
                 low[x] = 0
         middle = np.empty(width, np.uint16)
@@ -86,9 +87,10 @@ def fit_planes(
 ) -> None:
     """Value at each pixel of the plane fitted to the inverse depth around it.
 
-    A plane in space is linear in inverse depth over the image, so the fit has no bias on slopes. Neighbours across a
-    depth jump of ``gate_m`` do not count. ``depth`` and ``inverse`` carry a border of ``radius`` zeros; ``out`` does
-    not. Whole rows are summed tap by tap, so that the inner loop runs in vector instructions.
+    A plane in space is linear in inverse depth over the image, so the fit has no bias on slopes. Neighbours
+    across a depth jump of ``gate_m`` do not count. ``depth`` and ``inverse`` carry a border of ``radius``
+    zeros; ``out`` does not. Whole rows are summed tap by tap, so that the inner loop runs in vector
+    instructions.
     """
     radius = weights.shape[0] // 2
     height, width = out.shape
@@ -168,7 +170,7 @@ def _root(parents: NDArray[np.int32], i: int) -> int:
 
 @njit(cache=True, nogil=True)
 def label_components(depth: NDArray[np.float64], jump: NDArray[np.float64]) -> tuple[NDArray[np.int32], int]:
-    """Connected parts of a depth image: 8-neighbours whose depths differ by less than ``jump`` at either pixel.
+    """Connected parts of a depth image: 8-neighbours that differ by less than ``jump`` at either pixel.
 
     Returns labels (h, w) from 0, -1 where there is no depth, and their number.
     """

@@ -36,8 +36,8 @@ def fuse_depth(
 ) -> FusedDepth:
     """Fuse the frames of one stance pixel by pixel (METHOD section 2).
 
-    The answer is the mean of the measurements within ``gate_m`` of their median, where at least ``share`` of the
-    frames agree: a pixel that flickers between arm and wall takes one side or none, never the middle.
+    The answer is the mean of the measurements within ``gate_m`` of their median, where at least ``share`` of
+    the frames agree: a pixel that flickers between arm and wall takes one side or none, never the middle.
 
     Parameters
     ----------

@@ -98,8 +98,8 @@ def corners_of_vertices(
 def mark_bow_ties(triangles: NDArray[np.int32], count: int, alive: NDArray[np.bool_]) -> int:
     """Where fans of triangles meet in a vertex only, keep the largest fan; returns how many triangles went.
 
-    A vertex with two fans is not a surface there: a path could jump from one body part to the other, and boundary
-    walks are undefined.
+    A vertex with two fans is not a surface there: a path could jump from one body part to the other, and
+    boundary walks are undefined.
     """
     start, rows = corners_of_vertices(triangles, count)
     removed = 0
@@ -184,7 +184,7 @@ def normals_and_boundary(
     normals: NDArray[np.float64],
     boundary: NDArray[np.bool_],
 ) -> None:
-    """Area-weighted unit normals, and whether a vertex lies on the rim: it has one neighbour more than triangles."""
+    """Area-weighted unit normals, and whether a vertex lies on the rim: one neighbour more than triangles."""
     for index in prange(len(vertices)):
         i = np.int64(index)
         nx, ny, nz = 0.0, 0.0, 0.0

@@ -14,7 +14,8 @@ from core.surface.skin_judgement import judge_skin
 
 FloatArray = NDArray[np.float64]
 
-# A ray that passes the rim of the measured skin this closely meant the skin: depth cameras lose the last pixels.
+# A ray that passes the rim of the measured skin this closely meant the skin: depth cameras lose the last
+# pixels.
 _LIFT_M = 0.012
 # A nearer rim this close wins over what the ray hits farther behind it.
 _RIM_M = 0.004
@@ -34,8 +35,8 @@ class SkinPick:
     Attributes
     ----------
     point : SurfacePoint or None
-        None if the click is refused. Beyond the rim of the measured surface `SurfacePoint.position_m` lies on the
-        tangent plane under the click, up to 12 mm from the triangle that carries it.
+        None if the click is refused. Beyond the rim of the measured surface `SurfacePoint.position_m` lies on
+        the tangent plane under the click, up to 12 mm from the triangle that carries it.
     normal : ndarray (3,) or None
         Unit, toward the camera.
     reason : str or None
@@ -58,7 +59,8 @@ def pick_skin(scan: BodyScan, pixel: ArrayLike, *, head_m: ArrayLike | None = No
     Parameters
     ----------
     head_m : array_like (3,), optional
-        Centre of the head in the depth-camera frame, where hair is looked for; guessed from the outline without it.
+        Centre of the head in the depth-camera frame, where hair is looked for; guessed from the outline
+        without it.
     """
     return _pick(scan, scan.capture.rig, np.asarray(pixel, dtype=float).reshape(2), head_m)
 
@@ -94,8 +96,8 @@ def _rim_point(
 ) -> tuple[SurfacePoint | None, tuple[str, ...]]:
     """The skin just beside the ray, when the ray misses the surface or passes close before a farther part.
 
-    The place is where the ray meets the tangent plane of the nearest rim vertex. Seen flat, that plane is useless,
-    and the point of the ray nearest to the vertex is taken.
+    The place is where the ray meets the tangent plane of the nearest rim vertex. Seen flat, that plane is
+    useless, and the point of the ray nearest to the vertex is taken.
     """
     surface = scan.surface
     rim = np.flatnonzero(surface.boundary)

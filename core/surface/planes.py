@@ -27,7 +27,7 @@ class Plane:
         return np.asarray(points @ self.normal + self.offset)
 
     def tolerance(self, points: FloatArray) -> FloatArray:
-        """How far off the plane a depth camera may see its points (...,): noise grows with the square of depth.
+        """How far off the plane its points (...,) may be seen: noise grows with the square of depth.
 
         Only the part of the noise along the normal counts, which is little on a floor seen at a flat angle.
         """

@@ -61,7 +61,7 @@ class GridTree:
         return RayHits(triangle >= 0, t, triangle, weights)
 
     def nearest(self, points: ArrayLike) -> tuple[IntArray, FloatArray]:
-        """Triangle (k,) and barycentric weights (k, 3) of the surface point nearest to each of points (k, 3)."""
+        """Triangle (k,) and barycentric weights (k, 3) of the surface points nearest to points (k, 3)."""
         from core.surface.tree_kernels import nearest_points
 
         p = np.ascontiguousarray(np.asarray(points, dtype=float).reshape(-1, 3))

@@ -62,8 +62,9 @@ class _Parts:
 def segment_body(depth_m: FloatArray, camera: PinholeCamera) -> BodyMask:
     """Find the patient in a fused depth image.
 
-    Walls and floor are removed as planes; of the connected parts left, the patient is the one that is large, central
-    and near, with the parts that belong to it (a forearm held before the trunk is an island in the image).
+    Walls and floor are removed as planes; of the connected parts left, the patient is the one that is large,
+    central and near, with the parts that belong to it (a forearm held before the trunk is an island in the
+    image).
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def segment_body(depth_m: FloatArray, camera: PinholeCamera) -> BodyMask:
         )
     if sides:
         warnings.append(
-            f"The body is cut by the {' and '.join(sides)} edge of the image; what is outside cannot be tracked."
+            f"The body is cut by the {' and '.join(sides)} edge of the image; the rest cannot be tracked."
         )
     return BodyMask(mask, tuple(warnings), bool(sides), others)
 
@@ -139,7 +140,7 @@ def _connected_parts(points: FloatArray, depth: FloatArray, camera: PinholeCamer
     big = number[index] >= 0
     index, p = number[index[big]], p[big]
     pixels = np.bincount(index, minlength=kept)
-    area = np.bincount(index, _pixel_area(p[:, 2], camera), minlength=kept)
+    area = np.bincount(index, _pixel_area(p[:, 2], camera), minlength=kept).astype(float)
     center = np.stack([np.bincount(index, p[:, k], minlength=kept) for k in range(3)], axis=1)
     low, high = np.full((kept, 3), np.inf), np.full((kept, 3), -np.inf)
     np.minimum.at(low, index, p)
@@ -192,9 +193,10 @@ def _other_people(parts: _Parts, belongs: BoolArray) -> int:
 
 
 def _cut_sides(mask: BoolArray, measured: BoolArray) -> list[str]:
-    """Edges of the image at which the body leaves it over more than a few pixels.
+    """Edges of the image at which the body leaves it.
 
-    Depth cameras leave a blind rim, so the edge is where measurements end, if that is near the image's border.
+    Depth cameras leave a blind rim, so the edge is where measurements end, if that is near the image's border. A body
+    that is cut ends there in a straight line; a fingertip that just reaches it does not.
     """
     sides = []
     for name, body, seen in (
@@ -204,7 +206,8 @@ def _cut_sides(mask: BoolArray, measured: BoolArray) -> list[str]:
         ("right", mask.T[::-1], measured.T[::-1]),
     ):
         first = int(seen.any(axis=1).argmax())
-        strip = body[first : first + _EDGE_PIXELS]
-        if first <= 0.06 * len(seen) and int(strip.any(axis=0).sum()) >= _EDGE_LENGTH:
+        strip = body[first : first + _EDGE_PIXELS].sum(axis=1)
+        at_border = int(strip[0]) >= max(_EDGE_LENGTH, 0.6 * float(strip[-1]))
+        if first <= 0.06 * len(seen) and at_border:
             sides.append(name)
     return sides

@@ -1,9 +1,9 @@
 """Does a spot lie on bare skin? A cautious judgement from colour, for one warning and one refusal.
 
-Limits, on purpose: it compares with the person's own skin, found by a loose colour range and the majority inside it;
-without enough such pixels it says nothing. Skin-coloured clothing passes. Hair is only claimed on the upper head and
-only when it is much darker than the skin; on very dark skin it is never claimed, and grey, fair and body hair pass.
-Depth-only recordings are never judged.
+Limits, on purpose: it compares with the person's own skin, found by a loose colour range and the majority
+inside it; without enough such pixels it says nothing. Skin-coloured clothing passes. Hair is only claimed on
+the upper head and only when it is much darker than the skin; on very dark skin it is never claimed, and grey,
+fair and body hair pass. Depth-only recordings are never judged.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Compiled ray and nearest-point queries in a pyramid of boxes over the depth grid. Imported only when used.
 
-The triangles of a depth surface are already sorted in space by the image: tiles of the grid are the leaves, and four
-neighbouring boxes make their parent. Building it is one pass, and rays from any camera can be traced through it.
+The triangles of a depth surface are already sorted in space by the image: tiles of the grid are the leaves,
+and four neighbouring boxes make their parent. Building it is one pass, and rays from any camera can be traced
+through it.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ def build_tree(
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
     """Triangles sorted by tile and the boxes of all levels.
 
-    ``dims`` (levels, 2) are rows and columns per level, finest first; ``offsets`` where each level's boxes begin.
-    Returns start (tiles + 1,), order (m,) and boxes (sum of levels, 6: low x y z, high x y z).
+    ``dims`` (levels, 2) are rows and columns per level, finest first; ``offsets`` where each level's boxes
+    begin. Returns start (tiles + 1,), order (m,) and boxes (sum of levels, 6: low x y z, high x y z).
     """
     rows, columns = dims[0, 0], dims[0, 1]
     m = len(triangles)
@@ -146,7 +147,7 @@ def _closest(
     c: NDArray[np.float64],
     weights: NDArray[np.float64],
 ) -> float:
-    """Squared distance to a triangle, and the barycentric weights of its nearest point (Ericson 2005, 5.1.5)."""
+    """Squared distance to a triangle, and the weights of its nearest point (Ericson 2005, 5.1.5)."""
     ab, ac, ap = b - a, c - a, p - a
     d1, d2 = np.sum(ab * ap), np.sum(ac * ap)
     bp = p - b

@@ -15,8 +15,8 @@ from core.surface.scan import scan_body
 def warm_up() -> None:
     """Run the whole way from frames to a click once on a small made-up body.
 
-    Takes a minute on a fresh installation, where the kernels are compiled and cached, and a second later on. Call it
-    in a background thread.
+    Takes a minute on a fresh installation, where the kernels are compiled and cached, and a second later on.
+    Call it in a background thread.
     """
     camera = PinholeCamera(160, 120, 140.0, 140.0, 79.5, 59.5)
     u, v = np.meshgrid(np.arange(160) - 79.5, np.arange(120) - 59.5)
