@@ -117,8 +117,8 @@ class Captures:
             )
             return [_capture(row) for row in rows]
 
-    def load(self, capture_id: int) -> RgbdCapture:
-        """The capture exactly as it was stored.
+    def load(self, capture_id: int, *, frames: int | None = None) -> RgbdCapture:
+        """The capture exactly as it was stored, or with its first ``frames`` depth frames only.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Captures:
         """
         with self._db.read() as session:
             document = self._row(session, capture_id).document
-        depth = [self._blobs.get(name) for name in self._files(capture_id, "depth")]
+        depth = [self._blobs.get(name) for name in self._files(capture_id, "depth")[:frames]]
         color = [self._blobs.get(name) for name in self._files(capture_id, "color")]
         return decode_capture(document, depth, color[0] if color else None)
 

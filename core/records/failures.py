@@ -21,23 +21,24 @@ class DamagedError(StorageError):
     """A stored picture or the database is not what was written."""
 
 
-_DISK_FULL = ("The disk with the clinic folder is full.", "Free some space on it and try again.")
+_DISK_FULL = ("The disk with {place} is full.", "Free some space on it and try again.")
 _READ_ONLY = (
-    "The clinic folder cannot be written.",
+    "You may not write to {place}.",
     "Ask for write permission on the folder, or choose another one.",
 )
 _GONE = (
-    "The clinic folder cannot be reached.",
-    "Check that the disk or the network drive is connected, then try again.",
+    "GeoDerm cannot reach {place}.",
+    "Check that the folder exists and that the disk or network drive is connected, then try again.",
 )
 _BUSY = (
     "The clinic database is in use by another program.",
     "Close the other program (a backup, or a second GeoDerm) and try again.",
 )
 _BROKEN_DISK = (
-    "The disk with the clinic folder reports an error.",
+    "The disk with {place} reports an error.",
     "Save your work elsewhere and have the disk checked.",
 )
+_NO_HANDLES = ("Too many files are open on this computer.", "Close some programs and try again.")
 
 _OS_FAILURES: dict[int, tuple[str, str]] = {
     errno.ENOSPC: _DISK_FULL,
@@ -54,8 +55,8 @@ _OS_FAILURES: dict[int, tuple[str, str]] = {
     errno.ETIMEDOUT: _GONE,
     errno.EHOSTDOWN: _GONE,
     errno.EIO: _BROKEN_DISK,
-    errno.EMFILE: ("Too many files are open on this computer.", "Close some programs and try again."),
-    errno.ENFILE: ("Too many files are open on this computer.", "Close some programs and try again."),
+    errno.EMFILE: _NO_HANDLES,
+    errno.ENFILE: _NO_HANDLES,
 }
 
 _SQLITE_FAILURES: dict[str, tuple[str, str]] = {
@@ -72,10 +73,13 @@ _SQLITE_FAILURES: dict[str, tuple[str, str]] = {
 _SQLITE_DAMAGE = ("SQLITE_CORRUPT", "SQLITE_NOTADB")
 
 
-def storage_error(error: OSError) -> StorageError | None:
+CLINIC_FOLDER = "the clinic folder"
+
+
+def storage_error(error: OSError, place: str = CLINIC_FOLDER) -> StorageError | None:
     """The user's message for an error of the operating system, or None if it is not the environment's."""
     told = _OS_FAILURES.get(error.errno or 0)
-    return StorageError(*told) if told else None
+    return StorageError(told[0].format(place=place), told[1]) if told else None
 
 
 def database_error(error: BaseException | None) -> StorageError | None:
@@ -85,7 +89,7 @@ def database_error(error: BaseException | None) -> StorageError | None:
     name = getattr(error, "sqlite_errorname", "") or ""
     for prefix, told in _SQLITE_FAILURES.items():
         if name == prefix or name.startswith(prefix + "_"):
-            return StorageError(*told)
+            return StorageError(told[0].format(place=CLINIC_FOLDER), told[1])
     if any(name == damage or name.startswith(damage + "_") for damage in _SQLITE_DAMAGE):
         return DamagedError(
             "The clinic database is damaged.", "Restore the clinic folder from the last good backup."
@@ -94,8 +98,11 @@ def database_error(error: BaseException | None) -> StorageError | None:
 
 
 @contextmanager
-def told_to_the_user() -> Iterator[None]:
-    """Turn the environment's failures inside the block into `StorageError`; let mistakes through."""
+def told_to_the_user(place: str = CLINIC_FOLDER) -> Iterator[None]:
+    """Turn the environment's failures inside the block into `StorageError`; let mistakes through.
+
+    ``place`` is what is being read or written, in words, without any patient data.
+    """
     from sqlalchemy.exc import DBAPIError
 
     try:
@@ -111,7 +118,7 @@ def told_to_the_user() -> Iterator[None]:
             raise
         raise told from None
     except OSError as error:
-        told = storage_error(error)
+        told = storage_error(error, place)
         if told is None:
             raise
         raise told from error
