@@ -221,7 +221,7 @@ class Stage:
 
 
 def room_depth(stage: Stage, camera: PinholeCamera) -> tuple[Image, NDArray[np.int8]]:
-    """Depth (h, w) of the empty room, inf where there is nothing, and the number (h, w) of the plane, or -1."""
+    """Depth (h, w) of the empty room, inf for nothing, and the number (h, w) of the plane, or -1."""
     depth, which = stage.plane_hits(np.zeros(3), camera.pixel_rays.reshape(-1, 3))
     shape = (camera.height, camera.width)
     return depth.reshape(shape), which.reshape(shape)
@@ -230,7 +230,7 @@ def room_depth(stage: Stage, camera: PinholeCamera) -> tuple[Image, NDArray[np.i
 def true_depth(
     stage: Stage, camera: PinholeCamera, room: Image, cells: BoolArray, motion: RigidTransform
 ) -> tuple[Image, Hits, NDArray[np.int64]]:
-    """Depth (h, w) of people (moved by ``motion``) and ``room``; also the hits and their flat pixel numbers."""
+    """Depth (h, w) of people, moved by ``motion``, and ``room``; also the hits and their flat pixels."""
     rays = camera.pixel_rays.reshape(-1, 3)
     pixels = np.flatnonzero(cells)
     back = motion.inverse()
