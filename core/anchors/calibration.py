@@ -99,7 +99,7 @@ def apply_calibration(skeleton: Skeleton, calibration: SkeletonCalibration, rig:
         shift = float(np.linalg.norm(mended - end))
         residual = abs(float(np.linalg.norm(mended - root)) - length)
         side = "nearer to" if mended[2] < end[2] else "farther from"
-        if residual < abs(found - length) - 0.02:
+        if residual <= _tolerance(length) / 2:
             joints[far] = relifted(joints[far], mended, rig, 0.8 * joints[far].visibility)
             warnings.append(
                 f"The depth of the {spoken(far)} did not fit the calibrated skeleton "

@@ -64,7 +64,7 @@ def detect_pose(scan: BodyScan, tracker: SkeletonTracker) -> Detection | None:
     if picture is None:
         relief = detect_in_relief(scan, tracker, thorough=True)
         return None if relief is None else Detection(relief, "relief")
-    pixels = scan.capture.rig.project_to_picture(scan.surface.vertices)
+    pixels = scan.vertex_picture_pixels
     fault = picture_fault(picture, pixels)
     color = _detect(picture, _square(pixels, CROP_SCALES[0]), tracker)
     doubtful = bool(fault) or color is None or _clarity(color) < VISIBLE

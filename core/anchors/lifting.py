@@ -59,6 +59,9 @@ REACH_M: Final = 0.06
 PERCENTILE: Final = 20.0
 """Of the depths in a patch: the near side of a limb, not its receding flank."""
 
+NECK_PERCENTILE: Final = 70.0
+"""At the neck the near side is the chin."""
+
 PROPORTION: Final[dict[str, float]] = {"elbow": 0.475, "knee": 0.50}
 """Near bone's share of a limb (shoulder, elbow, middle of the hand; hip, knee, ankle)."""
 
@@ -160,7 +163,10 @@ def lift(landmarks: PoseLandmarks, source: JointSource, rig: CameraRig, surface:
     sight = Sight.of(rig, source)
     patches = _Patches(sight, surface)
     places = picture_joints(landmarks, sight.camera)
-    spots = {name: patches.spot(pixel, visibility) for name, (pixel, visibility) in places.items()}
+    spots = {
+        name: patches.spot(pixel, visibility, NECK_PERCENTILE if name == "neck" else PERCENTILE)
+        for name, (pixel, visibility) in places.items()
+    }
     chosen = {name: int(np.argmax(spot.shares)) for name, spot in spots.items()}
     for limb in LIMBS:
         chosen.update(_plausible_limb(limb, spots, sight, chosen))
@@ -205,7 +211,8 @@ class _Patches:
         """Distances across the picture, in metres at a depth."""
         return np.asarray(np.linalg.norm(pixels - pixel, axis=1) * depth / self._focal)
 
-    def spot(self, pixel: FloatArray, visibility: float) -> _Spot:
+    def spot(self, pixel: FloatArray, visibility: float, percentile: float = PERCENTILE) -> _Spot:
+        """Depths of the layers of skin under a pixel; beside the body the nearest outline serves."""
         distance, nearest = self._tree.query(pixel)
         per_metre = self._focal / self._depth[nearest]
         rows = np.asarray(self._tree.query_ball_point(pixel, PATCH_M * per_metre), dtype=int)
@@ -220,7 +227,7 @@ class _Patches:
         return _Spot(
             pixel,
             visibility,
-            np.array([np.percentile(layer, PERCENTILE) for layer in kept]),
+            np.array([np.percentile(layer, percentile) for layer in kept]),
             np.array([len(layer) for layer in kept]) / len(depth),
         )
 
