@@ -18,6 +18,7 @@ from core.errors import InputError
 from core.progress import Progress, ScaledProgress, no_progress
 from devices.camera import PreviewFrame
 from devices.simulator.body import PosedBody, load_body, pose_body, rotation_about
+from devices.simulator.dermoscopy import png_of_simulated, render_dermoscopy
 from devices.simulator.figure import skin_slide, with_breath, with_layer, with_weight_change
 from devices.simulator.marks import Moles, areolae, make_moles, scatter_freckles, scatter_moles
 from devices.simulator.recording import capture_truth, depth_frames, framing_distance, sway_motions
@@ -274,6 +275,33 @@ class SimulatedPatient:
         )
         picture = self._picture(setup.stage, small, visit, self._rng("preview"))
         return PreviewFrame(np.where(depth < 8.0, depth, np.float32(0)), picture.rgb)
+
+    def dermoscopy(self, lesion_id: str, visit: int = 1, *, size: int = 1024) -> NDArray[np.uint8]:
+        """Dermoscopic picture (size, size, 3) of a mole at a visit, grown if the visit's change says so.
+
+        Raises
+        ------
+        InputError
+            If the patient has no such mole at this visit.
+        """
+        moles = self.moles(visit)
+        if lesion_id not in moles.ids:
+            raise InputError(f"The simulated patient has no mole '{lesion_id}' at visit {visit}.")
+        row = moles.ids.index(lesion_id)
+        marks = moles.marks
+        return render_dermoscopy(
+            _key(self.shape, self.seed, "dermoscopy", lesion_id),
+            _key(self.shape, self.seed, "dermoscopy", lesion_id, visit),
+            radius_mm=1e3 * float(marks.radius_m[row]),
+            skin=self.skin.albedo[self.model.triangles[marks.triangle[row], 0]],
+            color=marks.color[row],
+            size=size,
+        )
+
+    def dermoscopy_png(self, lesion_id: str, visit: int = 1, *, size: int = 1024) -> bytes:
+        """The picture of `dermoscopy` as a PNG file whose metadata says that it was simulated."""
+        text = f"simulated patient {self.shape}, seed {self.seed}, lesion {lesion_id}, visit {visit}"
+        return png_of_simulated(self.dermoscopy(lesion_id, visit, size=size), text)
 
     def _stand(
         self,
