@@ -103,7 +103,7 @@ class BodySurface:
         component = vertex_components(triangles, len(used))
         keep = np.bincount(component, minlength=1)[component] >= smallest_part
         triangles, kept = _compact(triangles[keep[triangles[:, 0]]], len(used))
-        used = used[kept]
+        used, component = used[kept], component[kept]
         if len(triangles) == 0:
             raise WorkError(
                 "The depth image holds no connected surface.",
@@ -122,7 +122,7 @@ class BodySurface:
             pixels=np.stack([used % camera.width, used // camera.width], axis=1).astype(np.int32),
             vertex_of_pixel=vertex_of_pixel.reshape(camera.height, camera.width),
             boundary=boundary,
-            component=vertex_components(triangles, len(vertices)),
+            component=component,
             camera=camera,
         )
 

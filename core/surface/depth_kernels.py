@@ -204,3 +204,28 @@ def label_components(depth: NDArray[np.float64], jump: NDArray[np.float64]) -> t
                 else:
                     labels[y, x] = labels[r // width, r % width]
     return labels, count
+
+
+@njit(cache=True, nogil=True)
+def measure_parts(
+    labels: NDArray[np.int32], points: NDArray[np.float64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Per part the number of pixels, and rows of sum(z^2), sum(x y z), low (x y z), high (x y z)."""
+    pixels = np.zeros(count, np.int64)
+    measures = np.zeros((count, 10))
+    measures[:, 4:7] = np.inf
+    measures[:, 7:10] = -np.inf
+    height, width = labels.shape
+    for y in range(height):
+        for x in range(width):
+            part = labels[y, x]
+            if part < 0:
+                continue
+            pixels[part] += 1
+            measures[part, 0] += points[y, x, 2] * points[y, x, 2]
+            for k in range(3):
+                value = points[y, x, k]
+                measures[part, 1 + k] += value
+                measures[part, 4 + k] = min(measures[part, 4 + k], value)
+                measures[part, 7 + k] = max(measures[part, 7 + k], value)
+    return pixels, measures

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
-_NEVER = -1.0
+_MOST_AROUND = 64
 
 
 @njit(cache=True, nogil=True)
-def _quality(points: NDArray[np.float64], a: int, b: int, c: int, jump_m: float) -> float:
-    """Shape of a triangle: 1 equilateral, 0 a needle, negative if it would cross a depth jump or a hole."""
-    za, zb, zc = points[a, 2], points[b, 2], points[c, 2]
-    if za <= 0.0 or zb <= 0.0 or zc <= 0.0:
-        return _NEVER
-    if max(za, zb, zc) - min(za, zb, zc) > jump_m:
-        return _NEVER
-    p, q = points[b] - points[a], points[c] - points[a]
-    nx = p[1] * q[2] - p[2] * q[1]
-    ny = p[2] * q[0] - p[0] * q[2]
-    nz = p[0] * q[1] - p[1] * q[0]
-    r = points[c] - points[b]
-    edges = np.sum(p * p) + np.sum(q * q) + np.sum(r * r)
-    return float(2.0 * np.sqrt(3.0) * np.sqrt(nx * nx + ny * ny + nz * nz) / edges)
+def _joined(za: float, zb: float, zc: float, jump_m: float) -> bool:
+    """Whether three depths are measured and belong to one piece of skin."""
+    low, high = min(za, zb, zc), max(za, zb, zc)
+    return low > 0.0 and high - low <= jump_m
+
+
+@njit(cache=True, nogil=True)
+def _squared_distance(points: NDArray[np.float64], i: int, j: int) -> float:
+    total = 0.0
+    for k in range(3):
+        total += (points[i, k] - points[j, k]) ** 2
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -32,7 +30,8 @@ def triangulate_grid(
 ) -> NDArray[np.int32]:
     """Triangles (m, 3) of grid points (h * w, 3), wound to face the camera.
 
-    Of the two diagonals of a quad the one that keeps more triangles, then the better shaped ones, is taken.
+    Of the two diagonals of a quad the one that keeps more triangles is taken, of equal ones the shorter,
+    which gives the better shaped triangles.
     """
     out = np.empty((2 * (height - 1) * (width - 1), 3), np.int32)
     m = 0
@@ -40,34 +39,28 @@ def triangulate_grid(
         for u in range(width - 1):
             a = v * width + u
             b, c, d = a + 1, a + width, a + width + 1
-            if (
-                (points[a, 2] > 0.0) + (points[b, 2] > 0.0) + (points[c, 2] > 0.0) + (points[d, 2] > 0.0)
-            ) < 3:
+            za, zb, zc, zd = points[a, 2], points[b, 2], points[c, 2], points[d, 2]
+            if (za > 0.0) + (zb > 0.0) + (zc > 0.0) + (zd > 0.0) < 3:
                 continue
-            acb, bcd = _quality(points, a, c, b, jump_m), _quality(points, b, c, d, jump_m)
-            acd, adb = _quality(points, a, c, d, jump_m), _quality(points, a, d, b, jump_m)
-            first = (acb >= 0.0) + (bcd >= 0.0)
-            second = (acd >= 0.0) + (adb >= 0.0)
-            if first == 0 and second == 0:
-                continue
-            if first == 1 and second == 1:
-                use_first = max(acb, bcd) >= max(acd, adb)
-            elif first == second:
-                use_first = min(acb, bcd) >= min(acd, adb)
+            acb, bcd = _joined(za, zc, zb, jump_m), _joined(zb, zc, zd, jump_m)
+            acd, adb = _joined(za, zc, zd, jump_m), _joined(za, zd, zb, jump_m)
+            first, second = acb + bcd, acd + adb
+            if first == second and first > 0:
+                use_first = _squared_distance(points, b, c) <= _squared_distance(points, a, d)
             else:
                 use_first = first > second
             if use_first:
-                if acb >= 0.0:
+                if acb:
                     out[m, 0], out[m, 1], out[m, 2] = a, c, b
                     m += 1
-                if bcd >= 0.0:
+                if bcd:
                     out[m, 0], out[m, 1], out[m, 2] = b, c, d
                     m += 1
             else:
-                if acd >= 0.0:
+                if acd:
                     out[m, 0], out[m, 1], out[m, 2] = a, c, d
                     m += 1
-                if adb >= 0.0:
+                if adb:
                     out[m, 0], out[m, 1], out[m, 2] = a, d, b
                     m += 1
     return out[:m].copy()
@@ -95,6 +88,24 @@ def corners_of_vertices(
 
 
 @njit(cache=True, nogil=True)
+def _neighbours(
+    triangles: NDArray[np.int32], rows: NDArray[np.int32], vertex: int, around: NDArray[np.int32]
+) -> int:
+    """Number of vertices joined to ``vertex`` by the triangles ``rows``; ``around`` is scratch space."""
+    n = 0
+    for k in range(len(rows)):
+        for corner in range(3):
+            other = triangles[rows[k], corner]
+            known = other == vertex
+            for j in range(n):
+                known = known or around[j] == other
+            if not known and n < len(around):
+                around[n] = other
+                n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
 def mark_bow_ties(triangles: NDArray[np.int32], count: int, alive: NDArray[np.bool_]) -> int:
     """Where fans of triangles meet in a vertex only, keep the largest fan; returns how many triangles went.
 
@@ -103,12 +114,15 @@ def mark_bow_ties(triangles: NDArray[np.int32], count: int, alive: NDArray[np.bo
     """
     start, rows = corners_of_vertices(triangles, count)
     removed = 0
-    fan = np.empty(64, np.int32)
-    size = np.empty(64, np.int32)
+    fan = np.empty(_MOST_AROUND, np.int32)
+    size = np.empty(_MOST_AROUND, np.int32)
+    around = np.empty(2 * _MOST_AROUND, np.int32)
     for vertex in range(count):
         lo, n = start[vertex], start[vertex + 1] - start[vertex]
-        if n < 2 or n > 64:
+        if n < 2 or n > _MOST_AROUND:
             continue
+        if _neighbours(triangles, rows[lo : lo + n], vertex, around) <= n + 1:
+            continue  # one fan
         for i in range(n):
             fan[i] = i
         changed = True
@@ -165,17 +179,18 @@ def vertex_components(triangles: NDArray[np.int32], count: int) -> NDArray[np.in
     sizes = np.zeros(count, np.int32)
     for i in range(count):
         sizes[_root(parents, i)] += 1
-    order = np.argsort(-sizes, kind="mergesort")
-    rank = np.empty(count, np.int32)
-    for i in range(count):
-        rank[order[i]] = i
+    roots = np.flatnonzero(sizes)
+    order = np.argsort(-sizes[roots], kind="mergesort")
+    rank = np.zeros(count, np.int32)
+    for i in range(len(order)):
+        rank[roots[order[i]]] = i
     out = np.empty(count, np.int32)
     for i in range(count):
         out[i] = rank[_root(parents, i)]
     return out
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True)
 def normals_and_boundary(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int32],
@@ -185,11 +200,9 @@ def normals_and_boundary(
     boundary: NDArray[np.bool_],
 ) -> None:
     """Area-weighted unit normals, and whether a vertex lies on the rim: one neighbour more than triangles."""
-    for index in prange(len(vertices)):
-        i = np.int64(index)
+    for i in range(len(vertices)):
         nx, ny, nz = 0.0, 0.0, 0.0
-        around = np.empty(128, np.int32)
-        n = 0
+        around = np.empty(2 * _MOST_AROUND, np.int32)
         for k in range(start[i], start[i + 1]):
             t = rows[k]
             a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -206,14 +219,7 @@ def normals_and_boundary(
             nx += py * qz - pz * qy
             ny += pz * qx - px * qz
             nz += px * qy - py * qx
-            for corner in range(3):
-                vertex = triangles[t, corner]
-                known = vertex == i
-                for j in range(n):
-                    known = known or around[j] == vertex
-                if not known and n < 128:
-                    around[n] = vertex
-                    n += 1
+        n = _neighbours(triangles, rows[start[i] : start[i + 1]], i, around)
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
         if length > 0.0:
             normals[i, 0], normals[i, 1], normals[i, 2] = nx / length, ny / length, nz / length

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_HYPOTHESES = 300
-_SCORED_POINTS = 3000
+_DRAWN = 3000
+_SCORED = 150
+_SCORED_POINTS = 2000
 _MIN_POINTS = 300
 
 
@@ -93,14 +94,14 @@ def _best_plane(points: FloatArray, *, axis: int, lowest: float, highest: float,
     if len(points) < _MIN_POINTS:
         return None
     rng = np.random.default_rng(seed)
-    a, b, c = points[rng.integers(0, len(points), (3, _HYPOTHESES))]
+    a, b, c = points[rng.integers(0, len(points), (3, _DRAWN))]
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
     usable = lengths > 1e-4
     normals, a = normals[usable] / lengths[usable, None], a[usable]
     lean = np.abs(normals[:, axis])
     fits = (lean >= lowest) & (lean <= highest)
-    normals, a = normals[fits], a[fits]
+    normals, a = normals[fits][:_SCORED], a[fits][:_SCORED]
     if len(normals) == 0:
         return None
     sample = points[:: max(1, len(points) // _SCORED_POINTS)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +13,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 _TILE = 4
+_CHUNK = 4096
+_THREADS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +61,7 @@ class GridTree:
         o = np.ascontiguousarray(np.asarray(origin, dtype=float).reshape(3))
         t, triangle = np.empty(len(d)), np.empty(len(d), np.int32)
         weights = np.empty((len(d), 3))
-        cast_rays(*self._mesh, o, d, t, triangle, weights)
+        _in_chunks(lambda k: cast_rays(*self._mesh, o, d[k], t[k], triangle[k], weights[k]), len(d))
         return RayHits(triangle >= 0, t, triangle, weights)
 
     def nearest(self, points: ArrayLike) -> tuple[IntArray, FloatArray]:
@@ -66,9 +70,19 @@ class GridTree:
 
         p = np.ascontiguousarray(np.asarray(points, dtype=float).reshape(-1, 3))
         triangle, weights = np.full(len(p), -1, np.int32), np.zeros((len(p), 3))
-        nearest_points(*self._mesh, p, triangle, weights)
+        _in_chunks(lambda k: nearest_points(*self._mesh, p[k], triangle[k], weights[k]), len(p))
         return triangle, weights
 
     @property
     def _mesh(self) -> tuple[NDArray[np.generic], ...]:
         return (self._vertices, self._triangles, *self._tree, self._dims, self._offsets)
+
+
+def _in_chunks(work: Callable[[slice], None], count: int) -> None:
+    """Do ``work`` on all of ``count`` items, many of them in several threads: the kernels hold no lock."""
+    if count <= _CHUNK:
+        work(slice(0, count))
+        return
+    with ThreadPoolExecutor(_THREADS) as pool:
+        for _ in pool.map(work, [slice(i, i + _CHUNK) for i in range(0, count, _CHUNK)]):
+            pass

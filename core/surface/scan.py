@@ -19,6 +19,8 @@ from core.surface.skin_tone import SkinTone, measure_skin_tone
 
 FloatArray = NDArray[np.float64]
 
+_HEAD_GUESS_M = 0.12
+
 
 @dataclass(frozen=True, eq=False)
 class BodyScan:
@@ -56,6 +58,11 @@ class BodyScan:
     def skin_tone(self) -> SkinTone | None:
         """The person's own skin colour; None without enough of it."""
         return measure_skin_tone(self.capture, self.vertex_picture_pixels)
+
+    @cached_property
+    def head_m(self) -> FloatArray | None:
+        """Roughly the centre of the head: recorded, or guessed by `guess_head`."""
+        return guess_head(self.capture, self.surface)
 
 
 def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> BodyScan:
@@ -105,3 +112,23 @@ def _coverage(mask: NDArray[np.bool_]) -> float:
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     filled = cv2.drawContours(np.zeros_like(closed), outlines, -1, 1, cv2.FILLED)
     return float(mask.sum() / max(1, int(filled.sum())))
+
+
+def guess_head(capture: RgbdCapture, surface: BodySurface) -> FloatArray | None:
+    """Centre of the head: recorded, or below the top of the outline over the middle of the body.
+
+    None when the body is cut at the top, where the outline says nothing.
+    """
+    recorded = capture.joints_m
+    if recorded and "head" in recorded:
+        return recorded["head"]
+    main = surface.component == 0
+    vertices, pixels = surface.vertices[main], surface.pixels[main]
+    beside = np.abs(vertices[:, 0] - np.median(vertices[:, 0])) < 0.15
+    if not beside.any() or pixels[beside, 1].min() < 6:
+        return None
+    column = vertices[beside]
+    top = np.percentile(column[:, 1], 0.5)
+    cap = column[column[:, 1] < top + 2 * _HEAD_GUESS_M]
+    center = np.median(cap, axis=0)
+    return np.array([center[0], top + _HEAD_GUESS_M, center[2] + 0.08])

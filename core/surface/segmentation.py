@@ -126,26 +126,23 @@ def _in_room(points: FloatArray, depth: FloatArray, camera: PinholeCamera) -> Bo
 
 
 def _connected_parts(points: FloatArray, depth: FloatArray, camera: PinholeCamera) -> _Parts:
-    from core.surface.depth_kernels import label_components
+    from core.surface.depth_kernels import label_components, measure_parts
 
     jump = np.maximum(0.04, 0.01 * depth * depth)
     labels, count = label_components(np.ascontiguousarray(depth), jump)
-    on = labels >= 0
-    index, p = labels[on], points[on]
-    pixels = np.bincount(index, minlength=count)
-    number = np.cumsum(pixels >= _SPECK_PIXELS) - 1
-    number[pixels < _SPECK_PIXELS] = -1
-    labels = np.where(on, number[np.maximum(labels, 0)] if count else -1, -1).astype(np.int32)
-    kept = int(number.max(initial=-1)) + 1
-    big = number[index] >= 0
-    index, p = number[index[big]], p[big]
-    pixels = np.bincount(index, minlength=kept)
-    area = np.bincount(index, _pixel_area(p[:, 2], camera), minlength=kept).astype(float)
-    center = np.stack([np.bincount(index, p[:, k], minlength=kept) for k in range(3)], axis=1)
-    low, high = np.full((kept, 3), np.inf), np.full((kept, 3), -np.inf)
-    np.minimum.at(low, index, p)
-    np.maximum.at(high, index, p)
-    return _Parts(labels, pixels, area, center / np.maximum(pixels, 1)[:, None], low, high)
+    pixels, measures = measure_parts(labels, points, count)
+    kept = np.flatnonzero(pixels >= _SPECK_PIXELS)
+    number = np.full(count + 1, -1, np.int32)  # the last entry answers for label -1
+    number[kept] = np.arange(len(kept), dtype=np.int32)
+    pixels, measures = pixels[kept], measures[kept]
+    return _Parts(
+        labels=number[labels],
+        pixels=pixels,
+        area=measures[:, 0] / (camera.fx * camera.fy),
+        center=measures[:, 1:4] / np.maximum(pixels, 1)[:, None],
+        low=measures[:, 4:7],
+        high=measures[:, 7:10],
+    )
 
 
 def _main_part(parts: _Parts, points: FloatArray) -> int | None:
@@ -195,8 +192,8 @@ def _other_people(parts: _Parts, belongs: BoolArray) -> int:
 def _cut_sides(mask: BoolArray, measured: BoolArray) -> list[str]:
     """Edges of the image at which the body leaves it.
 
-    Depth cameras leave a blind rim, so the edge is where measurements end, if that is near the image's border. A body
-    that is cut ends there in a straight line; a fingertip that just reaches it does not.
+    Depth cameras leave a blind rim, so the edge is where measurements end, if that is near the image's
+    border. A body that is cut ends there in a straight line; a fingertip that just reaches it does not.
     """
     sides = []
     for name, body, seen in (

@@ -21,7 +21,6 @@ Verdict = Literal["skin", "clothing", "hair", "unknown"]
 # A ring around the spot, so that the lesion itself is not judged.
 _RING_M = (0.008, 0.020)
 _HAIR_REACH_M = 0.17
-_HEAD_GUESS_M = 0.12
 _HAIR_DARKNESS = 0.55
 _CHROMA_SPREAD = 4.0
 
@@ -44,32 +43,11 @@ def judge_skin(scan: BodyScan, position_m: FloatArray, head_m: FloatArray | None
     away = (lab - tone.center) / tone.spread
     dark = lab[0] < _HAIR_DARKNESS * tone.center[0]
     if dark and tone.center[0] > 35:
-        head = head_m if head_m is not None else guess_head(scan)
+        head = head_m if head_m is not None else scan.head_m
         if head is not None and np.linalg.norm(position_m - head) < _HAIR_REACH_M:
             return "hair"
     off = float(np.hypot(away[1], away[2]))
     return "clothing" if dark or off > _CHROMA_SPREAD else "skin"
-
-
-def guess_head(scan: BodyScan) -> FloatArray | None:
-    """Centre of the head: recorded, or below the top of the outline over the middle of the body.
-
-    None when the body is cut at the top, where the outline says nothing.
-    """
-    recorded = scan.capture.joints_m
-    if recorded and "head" in recorded:
-        return recorded["head"]
-    surface = scan.surface
-    main = surface.component == 0
-    vertices, pixels = surface.vertices[main], surface.pixels[main]
-    beside = np.abs(vertices[:, 0] - np.median(vertices[:, 0])) < 0.15
-    if not beside.any() or pixels[beside, 1].min() < 6:
-        return None
-    column = vertices[beside]
-    top = np.percentile(column[:, 1], 0.5)
-    cap = column[column[:, 1] < top + 2 * _HEAD_GUESS_M]
-    center = np.median(cap, axis=0)
-    return np.array([center[0], top + _HEAD_GUESS_M, center[2] + 0.08])
 
 
 def _ring(scan: BodyScan, position_m: FloatArray) -> FloatArray | None:

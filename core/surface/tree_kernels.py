@@ -8,7 +8,7 @@ through it.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 _STACK = 128
@@ -74,7 +74,7 @@ def _enter(box: NDArray[np.float64], o: NDArray[np.float64], inverse: NDArray[np
     return near if near <= far * (1.0 + 1e-12) + 1e-12 else np.inf
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True)
 def cast_rays(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int32],
@@ -90,8 +90,7 @@ def cast_rays(
     weights_out: NDArray[np.float64],
 ) -> None:
     """First hit of each ray: parameter (inf = none), triangle (-1 = none), barycentric weights."""
-    for index in prange(len(directions)):
-        i = np.int64(index)
+    for i in range(len(directions)):
         d = directions[i]
         inverse = np.empty(3)
         for q in range(3):
@@ -142,18 +141,23 @@ def cast_rays(
 @njit(cache=True, nogil=True)
 def _closest(
     p: NDArray[np.float64],
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
+    vertices: NDArray[np.float64],
+    a: int,
+    b: int,
+    c: int,
     weights: NDArray[np.float64],
 ) -> float:
     """Squared distance to a triangle, and the weights of its nearest point (Ericson 2005, 5.1.5)."""
-    ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = np.sum(ab * ap), np.sum(ac * ap)
-    bp = p - b
-    d3, d4 = np.sum(ab * bp), np.sum(ac * bp)
-    cp = p - c
-    d5, d6 = np.sum(ab * cp), np.sum(ac * cp)
+    d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        ab, ac = vertices[b, k] - vertices[a, k], vertices[c, k] - vertices[a, k]
+        ap, bp, cp = p[k] - vertices[a, k], p[k] - vertices[b, k], p[k] - vertices[c, k]
+        d1 += ab * ap
+        d2 += ac * ap
+        d3 += ab * bp
+        d4 += ac * bp
+        d5 += ab * cp
+        d6 += ac * cp
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
     if d1 <= 0.0 and d2 <= 0.0:
         wb, wc = 0.0, 0.0
@@ -169,11 +173,13 @@ def _closest(
         wc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         wb = 1.0 - wc
     else:
-        total = va + vb + vc
-        wb, wc = vb / total, vc / total
-    weights[0], weights[1], weights[2] = 1.0 - wb - wc, wb, wc
-    away = p - (weights[0] * a + wb * b + wc * c)
-    return float(np.sum(away * away))
+        wb, wc = vb / (va + vb + vc), vc / (va + vb + vc)
+    wa = 1.0 - wb - wc
+    weights[0], weights[1], weights[2] = wa, wb, wc
+    total = 0.0
+    for k in range(3):
+        total += (p[k] - wa * vertices[a, k] - wb * vertices[b, k] - wc * vertices[c, k]) ** 2
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -185,7 +191,7 @@ def _box_distance(box: NDArray[np.float64], p: NDArray[np.float64]) -> float:
     return total
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True)
 def nearest_points(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int32],
@@ -199,8 +205,7 @@ def nearest_points(
     weights_out: NDArray[np.float64],
 ) -> None:
     """Exactly nearest point of the surface to each of ``points``, by branch and bound."""
-    for index in prange(len(points)):
-        i = np.int64(index)
+    for i in range(len(points)):
         p = points[i]
         best = np.inf
         weights = np.empty(3)
@@ -236,14 +241,9 @@ def nearest_points(
                 continue
             for k in range(start[node], start[node + 1]):
                 t = order[k]
-                d = _closest(
-                    p,
-                    vertices[triangles[t, 0]],
-                    vertices[triangles[t, 1]],
-                    vertices[triangles[t, 2]],
-                    weights,
-                )
+                d = _closest(p, vertices, triangles[t, 0], triangles[t, 1], triangles[t, 2], weights)
                 if d < best:
                     best = d
                     triangle_out[i] = t
-                    weights_out[i] = weights
+                    for q in range(3):
+                        weights_out[i, q] = weights[q]
