@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.capture.camera import PinholeCamera
+from core.capture.rgbd import RgbdCapture
+from core.errors import WorkError
 from core.exchange.fonts import picture_font
 from core.records.records import Pixel, Point
 
@@ -56,28 +58,29 @@ def shaded_depth(depth: NDArray[np.uint16], unit_m: float, camera: PinholeCamera
     return np.repeat(grey[..., None], 3, axis=2)
 
 
-def body_region(
-    depth_pixels: NDArray[np.float64], depth_m: NDArray[np.float64], near_m: float, size: tuple[int, int]
-) -> Region | None:
-    """Where the body is in a picture: what lies within 45 cm of the distance ``near_m`` of its lesions.
+def body_region(capture: RgbdCapture) -> Region | None:
+    """Where the body is in the picture of a capture, with a small margin; None if no body is found."""
+    from core.surface.segmentation import segment_body
 
-    Parameters
-    ----------
-    depth_pixels : ndarray (n, 2)
-        Picture pixels of measured depth points.
-    depth_m : ndarray (n,)
-        Their depths in metres.
-    near_m : float
-    size : (int, int)
-        Width and height of the picture.
-    """
-    near = (np.abs(depth_m - near_m) < 0.45) & np.isfinite(depth_pixels).all(axis=1)
-    q = depth_pixels[near]
-    if len(q) < 100:
+    camera = capture.rig.depth
+    depth = capture.depth_frames[0] * capture.depth_unit_m
+    try:
+        mask = segment_body(depth, camera).mask
+    except WorkError:
         return None
-    left, top = np.percentile(q, 0.5, axis=0)
-    right, bottom = np.percentile(q, 99.5, axis=0)
-    return padded((float(left), float(top), float(right), float(bottom)), 0.05, size)
+    v, u = np.nonzero(mask)
+    points = camera.rays(np.stack([u, v], axis=-1)) * depth[v, u, None]
+    pixels = capture.rig.project_to_picture(points)
+    pixels = pixels[np.isfinite(pixels).all(axis=1)]
+    if not len(pixels):
+        return None
+    picture = capture.rig.picture_camera
+    left, top = np.clip(pixels.min(axis=0), 0, None)
+    right, bottom = np.minimum(pixels.max(axis=0), (picture.width, picture.height))
+    if right - left < 1 or bottom - top < 1:
+        return None
+    region = (float(left), float(top), float(right), float(bottom))
+    return padded(region, 0.04, (picture.width, picture.height))
 
 
 def padded(region: Region, share: float, size: tuple[int, int]) -> Region:
@@ -104,7 +107,7 @@ def lesion_crop(
     from PIL import Image
 
     height, width = picture.shape[:2]
-    span = span_mm / mm_per_pixel if mm_per_pixel else width / 12.0
+    span = span_mm / mm_per_pixel if mm_per_pixel else width / 12.0 * span_mm / 140.0
     span = float(np.clip(span, 24.0, min(width, height)))
     scale = side / span
     shift = np.array([(side - 1) / 2 - scale * pixel[0], (side - 1) / 2 - scale * pixel[1]])
@@ -157,7 +160,7 @@ def _ring(side: int) -> Image:
 def _draw_scale(image: Image, width_mm: float) -> None:
     from PIL import ImageDraw
 
-    length_mm = next((mm for mm in (50, 20, 10, 5, 2) if mm < 0.4 * width_mm), 1)
+    length_mm = next((mm for mm in (200, 100, 50, 20, 10, 5, 2) if mm < 0.3 * width_mm), 1)
     side = image.width
     length = length_mm / width_mm * side
     margin, thick = side * 0.04, max(2, round(side * 0.011))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -37,11 +36,12 @@ class BodyView:
 
 @dataclass(frozen=True)
 class LesionAtVisit:
-    """What is known of a lesion at one visit."""
+    """What is known of a lesion at one visit: close up (`crop`) and with its surroundings (`context`)."""
 
     visit: Visit
     observation: Observation | None
     crop: Crop | None
+    context: Crop | None
     dermoscopy: tuple[DermoscopicImage, ...]
 
 
@@ -169,7 +169,7 @@ def _load(store: ClinicStore, visit: Visit) -> _LoadedVisit:
 
 def _at_visit(loaded: _LoadedVisit, lesion_id: int) -> LesionAtVisit:
     observation = loaded.best(lesion_id)
-    crop = None
+    crop = context = None
     if observation is not None and observation.pixel is not None and is_placed(observation):
         capture = loaded.loaded[observation.capture_id]
         scale = None
@@ -179,9 +179,11 @@ def _at_visit(loaded: _LoadedVisit, lesion_id: int) -> LesionAtVisit:
                 capture.rig.picture_camera,
                 (float(in_picture[0]), float(in_picture[1]), float(in_picture[2])),
             )
-        crop = lesion_crop(picture_of(capture), observation.pixel, mm_per_pixel=scale)
+        picture = picture_of(capture)
+        crop = lesion_crop(picture, observation.pixel, mm_per_pixel=scale)
+        context = lesion_crop(picture, observation.pixel, mm_per_pixel=scale, span_mm=500.0)
     images = tuple(image for image in loaded.dermoscopy if image.lesion_id == lesion_id)
-    return LesionAtVisit(loaded.visit, observation, crop, images)
+    return LesionAtVisit(loaded.visit, observation, crop, context, images)
 
 
 def _views(loaded: _LoadedVisit, numbers: dict[int, int]) -> tuple[BodyView, ...]:
@@ -202,7 +204,7 @@ def _views(loaded: _LoadedVisit, numbers: dict[int, int]) -> tuple[BodyView, ...
             for o in placed
             if o.pixel is not None and _inside(o.pixel, picture)
         )
-        views.append(BodyView(_title(record), picture, marks, _region(capture, placed)))
+        views.append(BodyView(_title(record), picture, marks, body_region(capture)))
     marked = [view for view in views if view.marks]
     return tuple(marked or views[:1])
 
@@ -215,20 +217,6 @@ def _title(record: CaptureRecord) -> str:
 def _inside(pixel: tuple[float, float], picture: NDArray[np.uint8]) -> bool:
     height, width = picture.shape[:2]
     return bool(-0.5 <= pixel[0] <= width - 0.5 and -0.5 <= pixel[1] <= height - 0.5)
-
-
-def _region(capture: RgbdCapture, placed: Sequence[Observation]) -> Region | None:
-    distances = [o.point_m[2] for o in placed if o.point_m is not None]
-    camera = capture.rig.depth
-    depth = capture.depth_frames[0][::4, ::4].astype(float) * capture.depth_unit_m
-    v, u = np.nonzero(depth)
-    z = depth[v, u]
-    if not len(z):
-        return None
-    points = camera.rays(np.stack([u * 4, v * 4], axis=-1)) * z[:, None]
-    near = float(np.median(distances)) if distances else float(np.percentile(z, 25))
-    picture = capture.rig.picture_camera
-    return body_region(capture.rig.project_to_picture(points), z, near, (picture.width, picture.height))
 
 
 def require_picture(data: bytes) -> None:

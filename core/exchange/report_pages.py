@@ -8,6 +8,7 @@ from typing import Any, BinaryIO
 
 from reportlab import rl_config
 from reportlab.lib.units import mm
+from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import (
     BaseDocTemplate,
@@ -38,6 +39,7 @@ from core.exchange.report_style import (
     PALE,
     TEAL,
     TEAL_PALE,
+    labelled,
     words,
 )
 from core.records.images import shown_image
@@ -111,15 +113,16 @@ def _next_header(report: VisitReport) -> Callable[[Any, Any], None]:
         y = PAGE_HEIGHT - 12 * mm
         canvas.setFont(BOLD, 8)
         canvas.setFillColor(INK)
-        name = _fitted(report.patient.full_name, BOLD, 8, CONTENT * 0.5)
-        canvas.drawString(MARGIN, y, name)
-        facts = [f"born {say.day(report.patient.birth_date)}" if report.patient.birth_date else ""]
-        facts += [f"No. {report.patient.clinic_number}" if report.patient.clinic_number else ""]
+        patient = report.patient
+        facts = [f"born {say.day(patient.birth_date)}" if patient.birth_date else ""]
+        facts += [f"No. {patient.clinic_number}" if patient.clinic_number else ""]
         facts += [f"visit {report.visit.number}, {say.day(report.visit.started_at)}"]
+        line = _fitted("   ·   ".join(fact for fact in facts if fact), REGULAR, 7.4, CONTENT * 0.7)
+        room = CONTENT - stringWidth(line, REGULAR, 7.4) - 6 * mm
+        canvas.drawString(MARGIN, y, _fitted(patient.full_name, BOLD, 8, room))
         canvas.setFillColor(GREY)
         canvas.setFont(REGULAR, 7.4)
-        line = "   ·   ".join(fact for fact in facts if fact)
-        canvas.drawRightString(PAGE_WIDTH - MARGIN, y, _fitted(line, REGULAR, 7.4, CONTENT * 0.48))
+        canvas.drawRightString(PAGE_WIDTH - MARGIN, y, line)
         canvas.setStrokeColor(LINE)
         canvas.setLineWidth(0.6)
         canvas.line(MARGIN, y - 3 * mm, PAGE_WIDTH - MARGIN, y - 3 * mm)
@@ -166,8 +169,6 @@ def _draw_footer(canvas: Any, report: VisitReport, number: int, total: int) -> N
 
 def _fitted(text: str, font: str, size: float, width: float) -> str:
     """One line of text, cut with an ellipsis if it is wider than ``width``."""
-    from reportlab.pdfbase.pdfmetrics import stringWidth
-
     text = printable(text)
     if stringWidth(text, font, size) <= width:
         return text
@@ -237,22 +238,22 @@ def _map_part(report: VisitReport, body_map: bytes | None) -> list[Flowable]:
         note = words("No body photo was taken at this visit.", "small")
         return [KeepTogether([title, note]), Spacer(0, 5 * mm)]
     tall = 152 * mm
-    if len(report.views) == 1:
-        maps = [_captioned_map(report, 0, CONTENT, tall)]
-        rows: list[list[Any]] = [[maps[0]]]
-        widths = [CONTENT]
-    else:
-        gap = 6 * mm
-        width = (CONTENT - gap) / 2
-        maps = [_captioned_map(report, i, width, tall) for i in range(len(report.views))]
-        maps += [[]] * (len(maps) % 2)
-        rows = [[maps[i], "", maps[i + 1]] for i in range(0, len(maps), 2)]
-        widths = [width, gap, width]
+    columns = min(2, len(report.views))
+    gap = 6 * mm
+    width = CONTENT if columns == 1 else (CONTENT - gap) / 2
+    widths = [CONTENT] if columns == 1 else [width, gap, width]
     tables = []
-    for row in rows:
-        table = Table([row], colWidths=widths)
+    for i in range(0, len(report.views), columns):
+        views = report.views[i : i + columns]
+        maps: list[Any] = [BodyMap(view, width, tall) for view in views]
+        captions: list[Any] = [words(view.title, "caption") for view in views]
+        if columns == 2:
+            maps, captions = [maps[0], "", *maps[1:]], [captions[0], "", *captions[1:]]
+            maps += [""] * (3 - len(maps))
+            captions += [""] * (3 - len(captions))
+        table = Table([maps, captions], colWidths=widths)
         table.setStyle(
-            [*_NO_PADDING, ("VALIGN", (0, 0), (-1, -1), "TOP"), ("ALIGN", (0, 0), (-1, -1), "CENTER")]
+            [*_NO_PADDING, ("VALIGN", (0, 0), (-1, -1), "MIDDLE"), ("TOPPADDING", (0, 1), (-1, 1), 3)]
         )
         tables.append(table)
     legend = [_legend(report), Spacer(0, 5 * mm)]
@@ -260,11 +261,6 @@ def _map_part(report: VisitReport, body_map: bytes | None) -> list[Flowable]:
     for table in tables[1:]:
         parts += [Spacer(0, 3 * mm), table]
     return parts if len(tables) == 1 else [*parts, *legend]
-
-
-def _captioned_map(report: VisitReport, index: int, width: float, height: float) -> list[Flowable]:
-    view = report.views[index]
-    return [BodyMap(view, width, height), Spacer(0, 1.2 * mm), words(view.title, "caption")]
 
 
 def _legend(report: VisitReport) -> Flowable:
@@ -299,9 +295,9 @@ def _summary_part(report: VisitReport) -> list[Flowable]:
     rows: list[list[Any]] = [head]
     for entry in report.entries:
         observation = entry.now.observation
-        radius = (
-            observation.radius95_m if observation is not None and observation.decision != "rejected" else None
-        )
+        radius = None
+        if observation is not None and observation.decision in ("proposed", "confirmed"):
+            radius = observation.radius95_m
         rows.append(
             [
                 words(str(entry.lesion.number), "strong"),
@@ -386,21 +382,27 @@ def _lesion_block(store: ClinicStore, report: VisitReport, entry: LesionEntry) -
             ("RIGHTPADDING", (1, 0), (1, 0), 3 * mm),
         ]
     )
-    facts = [f"Position: {say.position(report, observation)}"]
+    facts = [("Position", say.position(report, observation))]
     size = None if observation is None else observation.size_mm
-    before = (
-        None if entry.before is None or entry.before.observation is None else entry.before.observation.size_mm
-    )
+    earlier = None if entry.before is None else entry.before.observation
+    before = None if earlier is None else earlier.size_mm
     if size is not None or before is not None:
-        earlier = f" (previous visit: {say.size(before)})" if before is not None else ""
-        facts.append(f"Size: {say.size(size) if size is not None else 'not measured'}{earlier}")
-    return [
-        bar,
-        *(words(fact, "small") for fact in facts),
-        Spacer(0, 2 * mm),
-        _pictures(store, entry),
-        Spacer(0, 1.5 * mm),
-    ]
+        was = f"  (previous visit: {say.size(before)})" if before is not None else ""
+        facts.append(("Size", f"{say.size(size) if size is not None else 'not measured'}{was}"))
+    return [bar, _fact_table(facts), Spacer(0, 2 * mm), _pictures(store, entry), Spacer(0, 1.5 * mm)]
+
+
+def _fact_table(facts: list[tuple[str, str]]) -> Table:
+    """Labels in one column, what they say in the other."""
+    label_width = 21 * mm
+    table = Table(
+        [[words(label, "factlabel"), words(value, "fact")] for label, value in facts],
+        colWidths=[label_width, CONTENT - label_width],
+    )
+    table.setStyle(
+        [*_NO_PADDING, ("VALIGN", (0, 0), (-1, -1), "TOP"), ("BOTTOMPADDING", (0, 0), (-1, -1), 1.2)]
+    )
+    return table
 
 
 def _pictures(store: ClinicStore, entry: LesionEntry) -> Flowable:
@@ -416,7 +418,11 @@ def _pictures(store: ClinicStore, entry: LesionEntry) -> Flowable:
             dermoscopy.insert(0, PictureBox(side, "Dermoscopy, previous visit", jpeg=None, missing=gone))
         else:
             dermoscopy.insert(0, _dermoscopy_box(store, side, before, "previous visit"))
-    return PictureRow([*photos, *dermoscopy], gap, pair_gap if before is not None else gap)
+        return PictureRow([*photos, *dermoscopy], gap, pair_gap)
+    if now.context is not None:
+        caption = f"Where it is\n{say.day(now.visit.started_at)}"
+        photos.insert(0, PictureBox(side, caption, jpeg=now.context.jpeg))
+    return PictureRow([*photos, *dermoscopy], gap, pair_gap if len(photos) == 2 else gap)
 
 
 def _photo_box(side: float, at: LesionAtVisit, which: str, missing: str) -> PictureBox:
@@ -436,10 +442,11 @@ def _dermoscopy_box(store: ClinicStore, side: float, at: LesionAtVisit, which: s
 
 
 def _notes(entry: LesionEntry) -> list[Flowable]:
+    """Notes below the pictures; a long one runs on over as many pages as it needs."""
     notes = []
     if entry.now.observation is not None and entry.now.observation.note:
-        notes.append(f"This visit: {entry.now.observation.note}")
+        notes.append(("Note, this visit", entry.now.observation.note))
     if entry.lesion.note:
-        notes.append(f"Lesion: {entry.lesion.note}")
-    notes += [f"Dermoscopy: {image.note}" for image in entry.now.dermoscopy if image.note]
-    return [words(note, "body") for note in notes]
+        notes.append(("Note, lesion", entry.lesion.note))
+    notes += [("Note, dermoscopy", image.note) for image in entry.now.dermoscopy if image.note]
+    return [labelled(label, note) for label, note in notes]

@@ -38,6 +38,9 @@ def styles() -> dict[str, Any]:
     return {
         "body": body,
         "small": ParagraphStyle("small", body, fontSize=7.2, leading=9.8, textColor=GREY),
+        "fact": ParagraphStyle("fact", body, fontSize=7.8, leading=10.4),
+        "factlabel": ParagraphStyle("factlabel", body, fontSize=7.8, leading=10.4, textColor=GREY),
+        "note": ParagraphStyle("note", body, fontSize=7.8, leading=11, spaceBefore=2),
         "label": ParagraphStyle("label", body, fontSize=6.8, leading=9, textColor=GREY),
         "value": ParagraphStyle("value", body, fontSize=9, leading=12),
         "strong": ParagraphStyle("strong", body, fontName=BOLD),
@@ -65,3 +68,10 @@ def words(text: str, style: str = "body", *, color: Any = None) -> Any:
     if color is not None:
         inner = f'<font color="#{color.hexval()[2:]}">{inner}</font>'
     return Paragraph(inner, styles()[style])
+
+
+def labelled(label: str, text: str) -> Any:
+    """A paragraph that begins with a grey label."""
+    inner = escape(printable(text)).replace("\t", "    ").replace("\n", "<br/>")
+    grey = f'<font color="#{GREY.hexval()[2:]}">{escape(label)}:</font>'
+    return Paragraph(f"{grey} {inner}", styles()["note"])

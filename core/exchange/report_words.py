@@ -39,7 +39,7 @@ def size(mm: float | None) -> str:
     """A size in millimetres."""
     if mm is None:
         return NOTHING
-    return f"{mm:.1f} mm" if mm < 9.95 else f"{mm:.0f} mm"
+    return f"{mm:.1f}\u00a0mm" if mm < 9.95 else f"{mm:.0f}\u00a0mm"
 
 
 def confidence(value: float | None) -> str:
@@ -47,7 +47,7 @@ def confidence(value: float | None) -> str:
     if value is None:
         return NOTHING
     word = "high" if value >= 0.85 else "moderate" if value >= 0.6 else "low"
-    return f"{word} ({value * 100:.0f} %)"
+    return f"{word} ({value * 100:.0f}\u00a0%)"
 
 
 def finding(entry: LesionEntry) -> str:
@@ -81,7 +81,7 @@ def position(report: VisitReport, observation: Observation | None) -> str:
     if observation.confidence is not None and observation.proposed_pixel is not None:
         sure.append(f"{confidence(observation.confidence)} confidence")
     if observation.radius95_m is not None:
-        sure.append(f"95 % within {millimetres(observation.radius95_m)}")
+        sure.append(f"95\u00a0% within {millimetres(observation.radius95_m)}")
     proposal = f"proposed with {', '.join(sure)}" if sure else "proposed"
     reason = f" ({observation.reason.strip().rstrip('.')})" if observation.reason.strip() else ""
     if observation.decision == "marked":
