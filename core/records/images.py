@@ -61,7 +61,8 @@ def _decoded(data: bytes, draft_side: int | None = None) -> tuple[Image, str]:
 
     Every way in which the file can be bad is an `InputError`.
     """
-    from PIL import Image
+    # Pillow registers only the commonest formats by itself; these two must be imported to be known.
+    from PIL import Image, MpoImagePlugin, TiffImagePlugin  # noqa: F401
 
     try:
         with warnings.catch_warnings():
