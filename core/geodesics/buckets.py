@@ -1,12 +1,13 @@
 """The queue of the fronts: vertices in buckets of equal distance, first in, first out, each in at most one.
 
-A front only ever queues vertices less than one edge ahead of it, so a short ring of buckets replaces a heap: taking
-and moving a vertex costs a few writes to memory. Order inside a bucket is free because every method here corrects
-its labels. Vertex numbers are unsigned in the kernels: the compiler then need not care for negative indices, which
-alone makes the fronts a third faster.
+A front only ever queues vertices less than one edge ahead of it, so a short ring of buckets replaces a
+heap: taking and moving a vertex costs a few writes to memory. Order inside a bucket is free because every
+method here corrects its labels. Vertex numbers are unsigned in the kernels: the compiler then need not care
+for negative indices, which alone makes the fronts a third faster.
 
-``ring`` is (b, 2) int32: first and last vertex of a bucket, -1 when empty; ``link`` is (n, 3) int32: following
-vertex, preceding vertex, bucket (-1 when the vertex is not queued).
+``ring`` is (b, 2) int32: first and last vertex of a bucket, -1 when empty; ``link`` is (n, 4) int32:
+following vertex, preceding vertex, bucket (-1 when the vertex is not queued), and nothing, to fill 16
+bytes.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ def bucket_sizes(lengths: NDArray[np.float32]) -> tuple[float, int]:
 @numba.njit(nogil=True, cache=True)
 def new_queue(count, buckets):  # type: ignore[no-untyped-def]
     """An empty queue for ``count`` vertices: ``ring`` and ``link``."""
-    return np.full((buckets, 2), -1, np.int32), np.full((count, 3), -1, np.int32)
+    return np.full((buckets, 2), -1, np.int32), np.full((count, 4), -1, np.int32)
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def remove(ring, link, v):  # type: ignore[no-untyped-def]
     """Take vertex ``v`` (unsigned) out of its bucket."""
     following, preceding, bucket = link[v, 0], link[v, 1], np.uint32(link[v, 2])
@@ -53,16 +54,9 @@ def remove(ring, link, v):  # type: ignore[no-untyped-def]
     link[v, 2] = -1
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def put(ring, link, v, rank, present):  # type: ignore[no-untyped-def]
-    """Queue vertex ``v`` (unsigned) at bucket ``rank``, not before ``present``; returns 1 if it was not queued."""
-    bucket = np.uint32(max(rank, present) & (ring.shape[0] - 1))
-    new = 1
-    if link[v, 2] >= 0:
-        if link[v, 2] == np.int32(bucket):
-            return 0
-        remove(ring, link, v)
-        new = 0
+@numba.njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def append(ring, link, v, bucket):  # type: ignore[no-untyped-def]
+    """Queue vertex ``v`` (unsigned, not queued) last in ``bucket`` (unsigned)."""
     last = ring[bucket, 1]
     link[v, 0] = -1
     link[v, 1] = last
@@ -72,4 +66,3 @@ def put(ring, link, v, rank, present):  # type: ignore[no-untyped-def]
     else:
         ring[bucket, 0] = np.int32(v)
     ring[bucket, 1] = np.int32(v)
-    return new

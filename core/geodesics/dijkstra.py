@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from core.geodesics.buckets import bucket_sizes, new_queue, put, remove
+from core.geodesics.buckets import append, bucket_sizes, new_queue, remove
 from core.geodesics.meshes import FloatArray, IntArray, Source, checked_mesh, seed_sources
 from core.geodesics.paths import trace_edge_path
 from core.geodesics.solver import each_source
@@ -26,11 +26,16 @@ def dijkstra_front(start, neighbours, lengths, width, buckets, seeds, starts, d)
     d[:] = np.inf
     ring, link = new_queue(n, buckets)
     queued = 0
+    per_width = 1.0 / width
     for i in range(seeds.shape[0]):
         v = np.uint32(seeds[i])
         if starts[i] < d[v]:
             d[v] = starts[i]
-            queued += put(ring, link, v, np.int64(starts[i] / width), np.int64(0))
+            if link[v, 2] >= 0:
+                remove(ring, link, v)
+                queued -= 1
+            append(ring, link, v, np.uint32(np.int64(starts[i] * per_width) & (buckets - 1)))
+            queued += 1
     present = np.int64(0)
     while queued > 0:
         first = ring[np.uint32(present & (buckets - 1)), 0]
@@ -46,7 +51,14 @@ def dijkstra_front(start, neighbours, lengths, width, buckets, seeds, starts, d)
             candidate = da + np.float64(lengths[k])
             if candidate < d[t]:
                 d[t] = candidate
-                queued += put(ring, link, t, np.int64(candidate / width), present)
+                # Behind the front only by rounding or by a wide corner: then its turn is now.
+                bucket = np.uint32(max(np.int64(candidate * per_width), present) & (buckets - 1))
+                if link[t, 2] != np.int32(bucket):
+                    if link[t, 2] >= 0:
+                        remove(ring, link, t)
+                        queued -= 1
+                    append(ring, link, t, bucket)
+                    queued += 1
 
 
 @numba.njit(nogil=True, cache=True)

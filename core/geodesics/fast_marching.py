@@ -12,7 +12,7 @@ import math
 import numba
 import numpy as np
 
-from core.geodesics.buckets import new_queue, put, remove
+from core.geodesics.buckets import append, new_queue, remove
 from core.geodesics.meshes import FloatArray, IntArray
 from core.geodesics.wedge_solver import WedgeSolver
 
@@ -31,12 +31,17 @@ def fast_marching_front(  # type: ignore[no-untyped-def]
     d[:] = far
     ring, link = new_queue(n, buckets)
     queued = 0
+    per_width = 1.0 / width
     near = 0.0
     for i in range(seeds.shape[0]):
         v = np.uint32(seeds[i])
         if starts[i] < d[v]:
             d[v] = starts[i]
-            queued += put(ring, link, v, np.int64(starts[i] / width), np.int64(0))
+            if link[v, 2] >= 0:
+                remove(ring, link, v)
+                queued -= 1
+            append(ring, link, v, np.uint32(np.int64(starts[i] * per_width) & (buckets - 1)))
+            queued += 1
         for k in range(start[v], start[v + np.uint32(1)]):
             near = max(near, rings * max(shape[k, 0], shape[k, 1]))
     present = np.int64(0)
@@ -84,7 +89,14 @@ def fast_marching_front(  # type: ignore[no-untyped-def]
                                 candidate = min(candidate, da + gx * cx + gy * cy)
                 if candidate < dt - tolerance * lat:
                     d[t] = candidate
-                    queued += put(ring, link, t, np.int64(candidate / width), present)
+                    # Behind the front only by rounding or by a wide corner: then its turn is now.
+                    bucket = np.uint32(max(np.int64(candidate * per_width), present) & (buckets - 1))
+                    if link[t, 2] != np.int32(bucket):
+                        if link[t, 2] >= 0:
+                            remove(ring, link, t)
+                            queued -= 1
+                        append(ring, link, t, bucket)
+                        queued += 1
     for i in range(n):
         if d[i] >= far:
             d[i] = np.inf

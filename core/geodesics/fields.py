@@ -54,8 +54,9 @@ class GeodesicFields:
         """Distances (a, k) from every anchor to points between the vertices.
 
         On a flat triangle the squared distance to a fixed point is the barycentric mean of the squared corner
-        distances less ``sum_{i<j} w_i w_j |e_ij|^2``. That is exact where the surface can be unfolded, down to a
-        target beside the anchor or in its very triangle, where linear interpolation is wrong by half an edge.
+        distances less ``sum_{i<j} w_i w_j |e_ij|^2``. That is exact where the surface can be unfolded, down
+        to a target beside the anchor or in its very triangle, where linear interpolation is wrong by half an
+        edge.
         """
         if not points:
             return np.zeros((len(self.names), 0))
@@ -68,7 +69,7 @@ class GeodesicFields:
 def interpolate_distances(
     distances: FloatArray, vertices: FloatArray, corners: IntArray, weights: FloatArray
 ) -> FloatArray:
-    """Distances (a, k) inside triangles ``corners`` (k, 3) at barycentric ``weights`` (k, 3); see `GeodesicFields.at`."""
+    """Distances (a, k) inside triangles ``corners`` at ``weights``, both (k, 3); see `GeodesicFields.at`."""
     places = vertices[corners]
     spread = np.zeros(len(corners))
     for i, j in ((0, 1), (1, 2), (2, 0)):

@@ -31,7 +31,8 @@ def read_mesh(path: Path | str) -> tuple[FloatArray, IntArray]:
     Raises
     ------
     InputError
-        The file cannot be read, is damaged or contradicts itself; the message names the file and the line or field.
+        The file cannot be read, is damaged or contradicts itself; the message names the file and the line or
+        the field.
     """
     path = Path(path)
     readers = {".off": _read_off, ".obj": _read_obj, ".ply": read_ply}

@@ -110,7 +110,7 @@ def seed_sources(
         else:
             if not 0 <= int(source) < len(vertices):
                 raise InputError(
-                    f"Source {row} is vertex {int(source)}, but the mesh has vertices 0 to {len(vertices) - 1}."
+                    f"Source {row} is vertex {int(source)}, but the mesh has only {len(vertices)} vertices."
                 )
             seeds[row] = int(source)
     return seeds, starts

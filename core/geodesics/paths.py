@@ -1,4 +1,4 @@
-"""The shortest path itself, for drawing (thesis figure 8): across faces for fronts, along edges for Dijkstra."""
+"""The shortest path itself, for drawing (thesis figure 8): fronts cross faces, Dijkstra follows edges."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from core.surface.points import SurfacePoint
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _best_crossing(vertices, d, x, p, q, ends_only):  # type: ignore[no-untyped-def]
-    """Where a path from ``x`` best crosses edge ``pq``: share along it, value there, length of the way there."""
+    """Where a path from ``x`` best crosses edge ``pq``: share along it, value there, length of the way."""
     length = 0.0
     along = 0.0
     away = 0.0
@@ -54,7 +54,7 @@ def _best_crossing(vertices, d, x, p, q, ends_only):  # type: ignore[no-untyped-
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _walk_down(vertices, start, corners, d, home, a, b, c, x, path):  # type: ignore[no-untyped-def]
-    """Walk from ``x`` inside face ``abc`` down ``d`` until inside face ``home``; returns the number of points.
+    """Walk from ``x`` inside face ``abc`` down ``d`` until inside ``home``; returns the number of points.
 
     ``home`` is the source's triangle, or one vertex three times. The result is -1 when the walk cannot go on.
     The feature that holds ``x`` is face ``abc``, edge ``ab`` (c = -1) or vertex ``a`` (b = c = -1).
@@ -80,8 +80,8 @@ def _walk_down(vertices, start, corners, d, home, a, b, c, x, path):  # type: ig
         q = -1
         end = -1
         if c >= 0:
-            candidates = 1
-            first = 0
+            candidates = np.int64(1)
+            first = np.int64(0)
         else:
             first = np.int64(start[a])
             candidates = np.int64(start[a + 1]) - first
@@ -247,7 +247,7 @@ def _walk_edges(start, neighbours, lengths, d, home, v, path):  # type: ignore[n
         if v == home[0] or v == home[1] or v == home[2]:
             return count
         best = math.inf
-        following = -1
+        following = np.int64(-1)
         for k in range(np.int64(start[v]), np.int64(start[v + 1])):
             t = np.int64(neighbours[k])
             if d[t] < d[v] and d[t] + lengths[k] < best:
@@ -267,7 +267,7 @@ def trace_edge_path(
     target: SurfacePoint,
     source: Source | None = None,
 ) -> FloatArray:
-    """Trace the shortest path of a Dijkstra field: from vertex to vertex along ``graph`` (start, neighbours, lengths).
+    """Trace the shortest path of a Dijkstra field, vertex by vertex along ``graph`` (start, neighbours, lengths).
 
     Returns
     -------

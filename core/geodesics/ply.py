@@ -45,7 +45,7 @@ def read_ply(path: Path, data: bytes) -> tuple[FloatArray, IntArray]:
     names = [element.name for element in elements]
     if "vertex" not in names:
         raise InputError(f"{path}: the PLY header has no element 'vertex'.")
-    # Every row takes at least one byte: a count larger than the file is a lie, found before memory is asked for.
+    # Every row takes at least a byte: a count larger than the file is a lie, found before memory is taken.
     for element in elements:
         if element.properties and element.count > len(data):
             raise InputError(f"{path}: is too short for {element.count} rows of element '{element.name}'.")

@@ -1,4 +1,4 @@
-"""The geodesic methods by name. A method's module, and with it its compiled kernel, is loaded on first use."""
+"""The geodesic methods by name. A method's module, with its compiled kernel, is loaded on first use."""
 
 from __future__ import annotations
 
@@ -89,7 +89,8 @@ def grid_solver(surface: DepthGridSurface, *, jump_m: float = 0.05) -> GeodesicS
     surface : DepthGridSurface
         Its vertices are depth pixels, in the depth camera's frame.
     jump_m : float
-        Neighbours whose depths differ by more (metres) are not joined: an arm does not touch the torso behind it.
+        Neighbours whose depths differ by more (metres) are not joined: an arm is not joined to the torso
+        behind it.
     """
     from core.geodesics.grid import build_grid_solver
 
@@ -108,7 +109,8 @@ def trace_path(
     Parameters
     ----------
     solver : GeodesicSolver or (vertices, triangles)
-        The solver that made the distances (Dijkstra's paths follow edges, the others cross faces), or the mesh alone.
+        The solver that made the distances (Dijkstra's paths follow edges, the others cross faces), or the
+        mesh alone.
     distances : ndarray (n,)
         One row of `GeodesicSolver.distances`.
     target : SurfacePoint

@@ -25,7 +25,7 @@ class GeodesicSolver(Protocol):
         """Corner numbers (m, 3), which `SurfacePoint.triangle` counts."""
 
     def distances(self, sources: Sequence[Source], *, threads: int = 2) -> FloatArray:
-        """Distances (s, n) from every source to every vertex, in the unit of the vertices; inf = unreachable."""
+        """Distances (s, n) from every source to every vertex, in the vertices' unit; inf = unreachable."""
 
     def path(self, distances: FloatArray, target: SurfacePoint, source: Source | None = None) -> FloatArray:
         """Shortest path (k, 3) from ``target`` back to the source of ``distances`` (n,)."""

@@ -1,11 +1,11 @@
 """Virtual-source propagation: fronts that remember where they came from (METHOD, section 2).
 
-Every vertex keeps its distance ``d`` and ``s``, the distance already travelled when the path last bent (zero
-while it is straight). Across an edge ``(a, b)`` the pair of remaining distances ``d - s`` places the
-(pseudo-)source in the plane of the next triangle, so a circular front stays circular: on a plane the answer is
-exact up to rounding, where fast marching flattens the front in every triangle. After Trettner, Bommes and
-Kobbelt (2021), with the rule that ``s`` restarts only at boundary and saddle vertices, the only ones where a
-shortest path can bend.
+Every vertex keeps its distance ``d`` and ``s``, the distance already travelled when the path last bent
+(zero while it is straight). Across an edge ``(a, b)`` the pair of remaining distances ``d - s`` places the
+(pseudo-)source in the plane of the next triangle, so a circular front stays circular: on a plane the answer
+is exact up to rounding, where fast marching flattens the front in every triangle. After Trettner, Bommes
+and Kobbelt (2021), with the rule that ``s`` restarts only at boundary and saddle vertices, the only ones
+where a shortest path can bend.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import math
 import numba
 import numpy as np
 
-from core.geodesics.buckets import new_queue, put, remove
+from core.geodesics.buckets import append, new_queue, remove
 from core.geodesics.meshes import FloatArray, IntArray
 from core.geodesics.wedge_solver import WedgeSolver
 
@@ -39,12 +39,17 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
         state[i, 1] = 0.0
     ring, link = new_queue(n, buckets)
     queued = 0
+    per_width = 1.0 / width
     near = 0.0
     for i in range(seeds.shape[0]):
         v = np.uint32(seeds[i])
         if starts[i] < state[v, 0]:
             state[v, 0] = starts[i]
-            queued += put(ring, link, v, np.int64(starts[i] / width), np.int64(0))
+            if link[v, 2] >= 0:
+                remove(ring, link, v)
+                queued -= 1
+            append(ring, link, v, np.uint32(np.int64(starts[i] * per_width) & (buckets - 1)))
+            queued += 1
         for k in range(start[v], start[v + np.uint32(1)]):
             near = max(near, rings * max(shape[k, 0], shape[k, 1]))
     present = np.int64(0)
@@ -95,7 +100,14 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
                 if candidate < dt - tolerance * lat:
                     state[t, 0] = candidate
                     state[t, 1] = origin
-                    queued += put(ring, link, t, np.int64(candidate / width), present)
+                    # Behind the front only by rounding or by a wide corner: then its turn is now.
+                    bucket = np.uint32(max(np.int64(candidate * per_width), present) & (buckets - 1))
+                    if link[t, 2] != np.int32(bucket):
+                        if link[t, 2] >= 0:
+                            remove(ring, link, t)
+                            queued -= 1
+                        append(ring, link, t, bucket)
+                        queued += 1
     for i in range(n):
         d[i] = state[i, 0] if state[i, 0] < far else np.inf
 

@@ -33,7 +33,7 @@ def _patch(side: int = 6) -> _Patch:
 def warm_up() -> None:
     """Run every method once, with the types of real use, on a patch of 36 vertices.
 
-    The first run on a machine compiles (seconds); later ones load from the cache. Meant for a background thread.
+    The first run on a machine compiles (seconds); later ones load from the cache. For a background thread.
     """
     patch = _patch()
     target = SurfacePoint(0, np.full(3, 1.0 / 3.0), np.zeros(3))

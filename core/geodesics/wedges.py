@@ -1,9 +1,9 @@
 """The mesh as the fronts walk it: for every vertex the triangles around it, unfolded, in one flat table.
 
-A *wedge* of vertex ``a`` is a triangle seen from ``a``: its two other corners ``p`` and ``q``, the lengths of the
-sides ``ap``, ``aq`` and of the opposite edge ``pq``, and the angle at ``a``. Wedges of one vertex are contiguous
-(compressed sparse rows), numbers are unsigned and lengths float32: a front reads them in order and little memory
-moves (METHOD, section 2).
+A *wedge* of vertex ``a`` is a triangle seen from ``a``: its two other corners ``p`` and ``q``, the lengths
+of the sides ``ap``, ``aq`` and of the opposite edge ``pq``, and the angle at ``a``. Wedges of one vertex
+are contiguous (compressed sparse rows), numbers are unsigned and lengths float32: a front reads them in
+order and little memory moves (METHOD, section 2).
 """
 
 from __future__ import annotations

@@ -1,0 +1,50 @@
+"""``geoderm geodesics``: distances along a mesh from any of its vertices, as a NumPy file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from core.errors import InputError, WorkError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("geodesics")(geodesics)
+
+
+def geodesics(
+    mesh: Path = typer.Argument(..., help="OFF, OBJ or PLY file."),
+    sources: str = typer.Option(..., help="Vertex numbers, 0-based, separated by commas."),
+    method: str = typer.Option("virtual-source", help="dijkstra, fast-marching or virtual-source."),
+    out: Path = typer.Option(..., help="NumPy file to write: floats [sources, vertices], inf = unreachable."),
+) -> None:
+    """Distances along a mesh from vertices, in the mesh's unit."""
+    import numpy as np
+
+    from core.geodesics import geodesic_solver, read_mesh
+
+    if out.suffix != ".npy":
+        raise InputError(f"--out {out}: the name must end in .npy.")
+    numbers = _vertices(sources)
+    vertices, triangles = read_mesh(mesh)
+    for number in numbers:
+        if number >= len(vertices):
+            raise InputError(
+                f"--sources {number}: {mesh} has only {len(vertices)} vertices, numbered from 0."
+            )
+    distances = geodesic_solver(vertices, triangles, method).distances(numbers)
+    try:
+        with out.open("wb") as file:
+            np.save(file, distances)
+    except OSError as error:
+        raise WorkError(f"{out}: cannot be written ({error.strerror or 'output error'}).") from error
+    typer.echo(f"{len(numbers)} x {len(vertices)} distances written to {out}")
+
+
+def _vertices(text: str) -> list[int]:
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in words):
+        raise InputError(f"--sources '{text[:60]}': give vertex numbers such as 0,17,250.")
+    return [int(word) for word in words]
