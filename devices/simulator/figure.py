@@ -18,9 +18,7 @@ _SLIDING_JOINTS = {
 }
 
 
-def _smoothstep(x: FloatArray, low: float, high: float) -> FloatArray:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
+_FULL_BEND = np.pi / 3
 
 
 def with_weight_change(model: BodyModel, bind: FloatArray, share: float) -> FloatArray:
@@ -59,7 +57,7 @@ def with_layer(model: BodyModel, bind: FloatArray, thickness_m: FloatArray) -> F
 def skin_slide(body: PosedBody, rng: np.random.Generator) -> FloatArray:
     """Tangential displacement (n, 3) of the skin over the posed body, metres.
 
-    Near a bent joint the skin is drawn along the limb by 3 to 8 mm for each 90 degrees of bend, and a little
+    Near a joint bent by 60 degrees or more the skin is drawn along the limb by 3 to 8 mm, and a little
     to the side; linear-blend skinning does none of this. The field fades with the distance from the joint.
     The figure itself must stay: put the result back onto the surface (`closest_on_surface` of the renderer).
     """
@@ -68,7 +66,7 @@ def skin_slide(body: PosedBody, rng: np.random.Generator) -> FloatArray:
     scale = model.stature_m / 1.75
     for side in ("L", "R"):
         for bone, start, end, reach in _SLIDING_JOINTS.values():
-            amount = rng.uniform(0.003, 0.008) * min(body.bend.get(f"{bone}.{side}", 0.0) / (np.pi / 2), 1.2)
+            amount = rng.uniform(0.003, 0.008) * min(body.bend.get(f"{bone}.{side}", 0.0) / _FULL_BEND, 1.0)
             sideways = rng.normal(0.0, 0.35, 3)
             if amount < 1e-5:
                 continue

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
+from types import MappingProxyType
 from zlib import crc32
 
 import numpy as np
@@ -109,7 +110,7 @@ class SimulatedPatient:
         self.model = load_body(shape)
         self.shape, self.seed = shape, seed
         self.wardrobe: Wardrobe = wardrobe or ("shorts_top" if shape.startswith("f_") else "shorts")
-        self.changes = dict(changes or {})
+        self.changes: Mapping[int, VisitChange] = MappingProxyType(dict(changes or {}))
         self.variation = variation or Variation()
         self.room = room or Room()
         self.rig = rig or make_rig()

@@ -126,9 +126,6 @@ class CaptureTruth:
         if not camera.contains([[u, v]])[0]:
             return None
         cu, cv = int(np.clip(round(u), 0, camera.width - 1)), int(np.clip(round(v), 0, camera.height - 1))
-        own = self._row(cu, cv)
-        if own < 0:
-            return None
         around = [
             self._row(cu + du, cv + dv)
             for dv in (-1, 0, 1)
@@ -142,6 +139,9 @@ class CaptureTruth:
             if t > 0 and weights.min() > -1e-6 and (best is None or t < best[0]):
                 best = (t, int(triangle), weights)
         if best is None:
+            own = self._row(cu, cv)
+            if own < 0:
+                return None
             s, t = (float(x) for x in self.pixel_uv[own])
             best = (0.0, int(self.pixel_triangle[own]), np.array([1.0 - s - t, s, t]))
         return SurfacePoint(best[1], best[2], self.position(best[1], best[2]))

@@ -27,3 +27,13 @@ def followup(patient: SimulatedPatient) -> SimulatedCapture:
 def dummy() -> SimulatedPatient:
     """A body that neither sways, breathes nor slides, in a small picture."""
     return SimulatedPatient(seed=5, moles=60, variation=STILL, rig=make_rig((320, 240)))
+
+
+@pytest.fixture(scope="package")
+def front(dummy: SimulatedPatient) -> SimulatedCapture:
+    return dummy.capture("A", "front", frames=1, distance_m=2.3, height_m=0.9)
+
+
+@pytest.fixture(scope="package")
+def back(dummy: SimulatedPatient) -> SimulatedCapture:
+    return dummy.capture("A", "back", frames=1, distance_m=2.3, height_m=0.9)

@@ -36,8 +36,9 @@ def test_the_same_lesion_and_visit_give_the_same_picture(growing: SimulatedPatie
 def test_a_growing_lesion_is_larger_at_the_next_visit(growing: SimulatedPatient) -> None:
     marks = growing.moles().marks
     smallest = growing.lesion_ids[int(marks.radius_m[: len(growing.lesion_ids)].argmin())]
-    growing.changes[2] = VisitChange(growth={smallest: 1.5})
-    before, after = (_dark_share(growing.dermoscopy(smallest, visit, size=384)) for visit in (1, 2))
+    change = VisitChange(growth={smallest: 1.5})
+    patient = SimulatedPatient(seed=2, moles=40, tone=1, changes={2: change})
+    before, after = (_dark_share(patient.dermoscopy(smallest, visit, size=384)) for visit in (1, 2))
     assert after > 1.4 * before
 
 

@@ -46,7 +46,7 @@ def _darker_than_around(simulated: SimulatedCapture, min_radius_px: float) -> li
 
 
 def test_a_mole_is_seen_in_the_picture_where_the_truth_says(first: SimulatedCapture) -> None:
-    shares = _darker_than_around(first, 0.6)
+    shares = _darker_than_around(first, 0.45)
     assert len(shares) >= 15
     assert np.mean(np.array(shares) < 0.97) > 0.9
 
@@ -70,16 +70,18 @@ def test_the_measured_depth_of_a_mole_agrees_within_the_noise(first: SimulatedCa
     u, v = np.rint(truth.mole_depth_pixels[rows]).astype(int).T
     frames = capture.depth_frames[:, v, u] * capture.depth_unit_m
     frames = np.where(frames > 0, frames, np.nan)
-    off = np.nanmedian(frames, axis=0) - truth.mole_points_m[rows, 2]
-    assert np.nanmedian(np.abs(off)) < 0.010
-    assert np.nanmean(np.abs(off) < 0.035) > 0.9
+    measured = np.isfinite(frames).any(axis=0)
+    off = np.nanmedian(frames[:, measured], axis=0) - truth.mole_points_m[rows[measured], 2]
+    assert measured.mean() > 0.9
+    assert np.median(np.abs(off)) < 0.010
+    assert np.mean(np.abs(off) < 0.035) > 0.9
 
 
-@pytest.mark.parametrize(("view", "sign"), [("front", 1.0), ("back", -1.0)])
+@pytest.mark.parametrize(("which", "sign"), [("front", 1.0), ("back", -1.0)])
 def test_the_patients_own_left_is_on_the_right_of_a_front_view(
-    dummy: SimulatedPatient, view: str, sign: float
+    which: str, sign: float, front: SimulatedCapture, back: SimulatedCapture
 ) -> None:
-    joints = dummy.capture("T", view, frames=1).truth.joints_m
+    joints = {"front": front, "back": back}[which].truth.joints_m
     for part in ("shoulder", "elbow", "hand", "hip", "knee", "foot"):
         assert sign * (joints[f"left_{part}"][0] - joints[f"right_{part}"][0]) > 0.1
 
@@ -91,9 +93,9 @@ def test_a_side_view_shows_that_side(dummy: SimulatedPatient, view: str, nearer:
     assert joints[f"{nearer}_shoulder"][2] < joints[f"{other}_shoulder"][2] - 0.2
 
 
-def test_turning_is_toward_the_patients_own_left(dummy: SimulatedPatient) -> None:
-    joints = dummy.capture("A", frames=1, turn_deg=30.0).truth.joints_m
-    assert joints["left_shoulder"][2] > joints["right_shoulder"][2] + 0.1
+def test_turning_is_toward_the_patients_own_left(followup: SimulatedCapture) -> None:
+    joints = followup.truth.joints_m
+    assert joints["left_shoulder"][2] > joints["right_shoulder"][2] + 0.03
 
 
 def test_joints_travel_with_the_capture_only_when_asked(
@@ -126,11 +128,12 @@ def test_unseen_moles_have_no_pixel(first: SimulatedCapture) -> None:
     assert 0.2 < truth.mole_visible.mean() < 0.6
 
 
-def test_moles_of_the_back_are_not_seen_from_the_front(dummy: SimulatedPatient) -> None:
-    front = dummy.capture("A", "front", frames=1).truth
-    back = dummy.capture("A", "back", frames=1).truth
-    assert not (front.mole_visible & back.mole_visible).any()
-    assert {front.mole_visible.sum() > 8, back.mole_visible.sum() > 8} == {True}
+def test_moles_of_the_back_are_not_seen_from_the_front(
+    front: SimulatedCapture, back: SimulatedCapture
+) -> None:
+    assert not (front.truth.mole_visible & back.truth.mole_visible).any()
+    assert front.truth.mole_visible.sum() > 8
+    assert back.truth.mole_visible.sum() > 8
 
 
 def test_the_background_shows_no_skin(first: SimulatedCapture) -> None:
@@ -165,7 +168,7 @@ def test_the_auxiliary_camera_with_distortion_keeps_the_truth() -> None:
 
 def test_the_same_seeds_give_the_same_capture() -> None:
     def shoot(seed: int) -> SimulatedCapture:
-        patient = SimulatedPatient(seed=seed, moles=30, rig=make_rig((160, 120)))
+        patient = SimulatedPatient("child10", seed, moles=30, rig=make_rig((64, 48)))
         return patient.capture("A", frames=2)
 
     one, again, other = shoot(1), shoot(1), shoot(2)
@@ -179,10 +182,12 @@ def test_the_same_seeds_give_the_same_capture() -> None:
 
 
 def test_a_second_person_is_in_the_room_but_not_in_the_truth() -> None:
-    patient = SimulatedPatient(seed=1, moles=30, variation=STILL, rig=make_rig((320, 240)))
-    alone = patient.capture("down", frames=1)
-    patient.room = Room(bystander=Bystander(right_m=0.9, behind_m=0.3))
-    joined = patient.capture("down", frames=1)
+    alone, joined = (
+        SimulatedPatient(
+            seed=1, moles=30, variation=STILL, rig=make_rig((160, 120)), room=Room(bystander=who)
+        ).capture("down", frames=1)
+        for who in (None, Bystander(right_m=0.9, behind_m=0.3))
+    )
     nearer = alone.capture.depth_frames[0].astype(int) - joined.capture.depth_frames[0]
     someone = (nearer > 300) & (joined.capture.depth_frames[0] > 0)
     assert someone.sum() > 5000
@@ -190,8 +195,8 @@ def test_a_second_person_is_in_the_room_but_not_in_the_truth() -> None:
     assert set(joined.truth.pixel_numbers) <= set(alone.truth.pixel_numbers)
 
 
-def test_floor_and_wall_are_measured_where_they_stand(dummy: SimulatedPatient) -> None:
-    capture = dummy.capture("A", frames=1, distance_m=2.3, height_m=0.9).capture
+def test_floor_and_wall_are_measured_where_they_stand(front: SimulatedCapture) -> None:
+    capture = front.capture
     points = capture.rig.depth.backproject(capture.depth_frames[0] * capture.depth_unit_m)
     wall = points[60:200, 20:80].reshape(-1, 3)
     assert np.median(wall[wall[:, 2] > 0, 2]) == pytest.approx(3.3, abs=0.06)
@@ -245,7 +250,7 @@ def test_skin_slides_by_millimetres_where_joints_bend(stance: str) -> None:
     body = pose_body(model, take_stance(Posture(model), stance))
     slid = np.linalg.norm(skin_slide(body, np.random.default_rng(1)), axis=1)
     assert slid.max() < 0.015
-    if stance in ("psi", "up", "forward", "hip_hands"):
+    if stance in ("psi", "up", "forward", "knee"):
         assert slid.max() > 0.003
     assert slid[model.bone_weight("head") > 0.9].max() < 0.0005
 
