@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from app.workflows.plan import OutOfView, RelocationPlan, Search
 from core.progress import Progress, ScaledProgress, no_progress
 from core.records import CandidatePlace, ObservationDraft
-from core.relocation.types import LesionQuery, RelocatedLesion
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
-    from core.relocation.types import RelocationResult
+    from core.relocation import RelocatedLesion, RelocationResult
 
 Analyse = Callable[[int, Progress], "AnalysedCapture"]
 
@@ -60,7 +59,7 @@ def run_plan(
         Relocation method; None for the default.
     progress : Progress
     """
-    from core.relocation import DEFAULT_METHOD, relocate
+    from core.relocation import DEFAULT_METHOD, LesionQuery, relocate
 
     drafts: list[ObservationDraft] = []
     warnings: list[str] = []

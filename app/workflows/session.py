@@ -174,6 +174,7 @@ class VisitSession:
         )
         self.store.anchors.put(record.id, _anchor_records(new.analysed))
         self._cache.put(record.id, new.analysed)
+        _warm_up_clicks(new.analysed)
         return record
 
     def take_stance(self, capture: RgbdCapture, progress: Progress = no_progress) -> NewCapture:
@@ -233,7 +234,9 @@ class VisitSession:
         if record.role == "working" and not self.is_ready(capture_id):
             calibration = self._calibration(record.visit_id, ScaledProgress(progress, 0.0, 0.4))
             progress = ScaledProgress(progress, 0.4, 1.0)
-        return self._cache.get(capture_id, calibration=calibration, progress=progress)
+        analysed = self._cache.get(capture_id, calibration=calibration, progress=progress)
+        _warm_up_clicks(analysed)
+        return analysed
 
     def _calibration(self, visit_id: int, progress: Progress) -> SkeletonCalibration | None:
         from core.anchors import calibrate_skeleton
@@ -361,6 +364,14 @@ class VisitSession:
         self.store.visits.discard(self.visit_id, self.user_id)
         self.state = target
         self.changed.notify()
+
+
+def _warm_up_clicks(analysed: AnalysedCapture) -> None:
+    """Make what the first click needs (search trees, compiled kernels), so that it is quick."""
+    from core.surface import pick_skin
+
+    rig = analysed.capture.rig
+    pick_skin(analysed.scan, rig.project_to_picture(analysed.scan.surface.vertices.mean(axis=0))[0])
 
 
 def _anchor_records(analysed: AnalysedCapture) -> list[AnchorRecord]:

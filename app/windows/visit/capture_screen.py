@@ -1,0 +1,281 @@
+"""Steps 1 and 2: the camera's picture, the camera and how the patient stands, and what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSignalBlocker, Signal, Slot
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.theme import icon, palette, set_state, style_class
+from app.widgets.photo_view import PhotoView
+from app.windows.visit.camera_deck import CameraDeck
+from app.windows.visit.pictures import joints_picture, preview_picture
+from app.windows.visit.side_panel import BulletList, SidePanel, field_label, wrapped
+
+if TYPE_CHECKING:
+    from core.anchors import AnalysedCapture
+    from devices.camera import PreviewFrame
+
+VIEWS = ("front", "back", "left", "right")
+STANCES = (
+    ("A", "Arms a little out"),
+    ("down", "Arms down"),
+    ("T", "Arms out to the side"),
+    ("psi", "Psi"),
+    ("forward", "Arms forward"),
+    ("up", "Arms up"),
+    ("knee", "One knee raised"),
+    ("twist", "Trunk turned"),
+    ("sidebend", "Bent to the side"),
+    ("hip_hands", "Hands on the hips"),
+)
+
+
+class CaptureScreen(QWidget):
+    """One capture step.
+
+    Parameters
+    ----------
+    name : {"stance", "capture"}
+        Prefix of the object names.
+    deck : CameraDeck
+        Shared by both steps.
+
+    Signals
+    -------
+    primary_clicked(), secondary_clicked()
+        The filled button, and the plain one beside it.
+    pose_changed()
+        Another view or simulated stance was chosen.
+    """
+
+    primary_clicked = Signal()
+    secondary_clicked = Signal()
+    pose_changed = Signal()
+
+    def __init__(self, name: str, deck: CameraDeck, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(f"{name}_screen")
+        self._name, self._deck = name, deck
+        self._live = True
+        self.photo = PhotoView()
+        self.photo.setObjectName(f"{name}_photo")
+        self.caption = QLabel()
+        self.caption.setObjectName(f"{name}_photo_caption")
+        style_class(self.caption, "caption")
+        self.panel = SidePanel(name)
+        self.corrections = BulletList(f"{name}_corrections", "warning")
+        self.warnings = BulletList(f"{name}_warnings", "info")
+        self.summary = wrapped("", "", f"{name}_summary")
+        self.secondary = self.panel.add_secondary("", f"{name}_secondary")
+        self.secondary.clicked.connect(self.secondary_clicked)
+        self.panel.primary.clicked.connect(self.primary_clicked)
+        self._build_controls()
+        self._build_layout()
+        deck.changed.connect(self._on_camera)
+        deck.frame.connect(self._on_frame)
+        self._on_camera()
+
+    # --- building ------------------------------------------------------------------------------------
+
+    def _build_controls(self) -> None:
+        self.camera_box = QComboBox()
+        self.camera_box.setObjectName(f"{self._name}_camera")
+        self.camera_box.activated.connect(self._on_camera_chosen)
+        self.open_folder = self._tool("Open capture folder", "folder", "open_folder", self._ask_folder)
+        self.open_recording = self._tool("Open .oni recording", "play", "open_recording", self._ask_recording)
+        self.views = QButtonGroup(self)
+        self.view_row = QHBoxLayout()
+        self.view_row.setSpacing(0)
+        for i, view in enumerate(VIEWS):
+            button = QPushButton(view.capitalize())
+            button.setObjectName(f"{self._name}_view_{view}")
+            button.setCheckable(True)
+            button.setChecked(i == 0)
+            style_class(button, "segment")
+            set_state(button, "first", "true" if i == 0 else "false")
+            set_state(button, "last", "true" if i == len(VIEWS) - 1 else "false")
+            self.views.addButton(button, i)
+            self.view_row.addWidget(button, 1)
+        self.views.idClicked.connect(lambda _: self.pose_changed.emit())
+        self.stance_box = QComboBox()
+        self.stance_box.setObjectName(f"{self._name}_stance")
+        for key, text in STANCES:
+            self.stance_box.addItem(text, key)
+        self.stance_box.currentIndexChanged.connect(lambda _: self.pose_changed.emit())
+        self.stance_label = field_label("Stance of the simulated patient")
+
+    def _tool(self, text: str, symbol: str, name: str, act: object) -> QPushButton:
+        button = QPushButton(icon(symbol, palette.SECONDARY), text)
+        button.setObjectName(f"{self._name}_{name}")
+        button.clicked.connect(act)
+        return button
+
+    def _build_layout(self) -> None:
+        frame = QFrame()
+        style_class(frame, "photo")
+        inside = QVBoxLayout(frame)
+        inside.setContentsMargins(1, 1, 1, 1)
+        inside.addWidget(self.photo)
+        left = QVBoxLayout()
+        left.setSpacing(8)
+        left.addWidget(frame, 1)
+        left.addWidget(self.caption)
+        body = self.panel.body
+        body.addWidget(self.corrections)
+        self.camera_label = field_label("Camera")
+        body.addWidget(self.camera_label)
+        body.addWidget(self.camera_box)
+        files = QHBoxLayout()
+        files.setSpacing(8)
+        files.addWidget(self.open_folder, 1)
+        files.addWidget(self.open_recording, 1)
+        body.addLayout(files)
+        self.view_label = field_label("Side of the body in the picture")
+        body.addSpacing(4)
+        body.addWidget(self.view_label)
+        body.addLayout(self.view_row)
+        body.addSpacing(4)
+        body.addWidget(self.stance_label)
+        body.addWidget(self.stance_box)
+        body.addWidget(self.summary)
+        body.addWidget(self.warnings)
+        body.addStretch(1)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(24, 16, 24, 24)
+        row.setSpacing(16)
+        row.addLayout(left, 1)
+        row.addWidget(self.panel)
+
+    # --- what is shown -------------------------------------------------------------------------------
+
+    def set_choices_visible(self, *, view: bool, stance: bool) -> None:
+        """Which of the choices this step offers."""
+        for button in self.views.buttons():
+            button.setVisible(view)
+        self.view_label.setVisible(view)
+        self._stance_wanted = stance
+        self._on_camera()
+
+    _stance_wanted = True
+
+    @property
+    def view(self) -> str:
+        """The side chosen."""
+        return VIEWS[max(self.views.checkedId(), 0)]
+
+    def set_view(self, view: str) -> None:
+        """Choose a side without telling."""
+        if view in VIEWS:
+            self.views.button(VIEWS.index(view)).setChecked(True)
+
+    @property
+    def stance(self) -> str:
+        """The simulated patient's stance chosen."""
+        return str(self.stance_box.currentData())
+
+    def show_preview(self) -> None:
+        """Show what the camera sees."""
+        self._live = True
+        self._on_camera()
+
+    def show_capture(self, analysed: AnalysedCapture | None, caption: str) -> None:
+        """Show a capture with its joints instead of the camera's picture."""
+        self._live = False
+        self.photo.set_image(None if analysed is None else joints_picture(analysed))
+        self.caption.setText(caption)
+
+    def show_plain(self, image: QImage, caption: str) -> None:
+        """Show a stored picture whose analysis is not in memory."""
+        self._live = False
+        self.photo.set_image(image)
+        self.caption.setText(caption)
+
+    @property
+    def live(self) -> bool:
+        """Whether the camera's picture is shown."""
+        return self._live
+
+    @Slot(object)
+    def _on_frame(self, frame: PreviewFrame) -> None:
+        if self._live and self.isVisible():
+            picture = preview_picture(frame)
+            if picture is not None:
+                self.photo.set_image(picture)
+                self.caption.setText(
+                    "What the camera sees now. Colours and sharpness are better in the capture."
+                )
+
+    # --- the camera ----------------------------------------------------------------------------------
+
+    def refresh_cameras(self) -> None:
+        """List the cameras there are now."""
+        with QSignalBlocker(self.camera_box):
+            self.camera_box.clear()
+            for info in self._deck.choices():
+                self.camera_box.addItem(info.name, info.id)
+            if not self.camera_box.count():
+                self.camera_box.addItem("No camera is connected", "")
+        self._on_camera()
+
+    @Slot()
+    def _on_camera(self) -> None:
+        deck = self._deck
+        with QSignalBlocker(self.camera_box):
+            index = self.camera_box.findData(deck.camera_id)
+            if deck.camera_id and index < 0:
+                self.camera_box.addItem(_recording_name(deck.camera_id), deck.camera_id)
+                index = self.camera_box.count() - 1
+            self.camera_box.setCurrentIndex(index)
+        simulated = deck.is_simulator and self._stance_wanted
+        self.stance_label.setVisible(simulated)
+        self.stance_box.setVisible(simulated)
+        if self._live:
+            if deck.camera is None:
+                self.photo.set_image(None)
+            self.caption.setText(
+                "Opening the camera."
+                if deck.camera_id and deck.camera is None
+                else ""
+                if deck.camera is not None
+                else "Choose a camera or open a recording."
+            )
+
+    @Slot(int)
+    def _on_camera_chosen(self, index: int) -> None:
+        camera_id = self.camera_box.itemData(index)
+        if camera_id:
+            self._deck.choose(str(camera_id))
+
+    @Slot()
+    def _ask_folder(self) -> None:
+        folder = QFileDialog.getExistingDirectory(self, "Open a capture folder")
+        if folder:
+            self._deck.choose_path(Path(folder))
+
+    @Slot()
+    def _ask_recording(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Open a recording", "", "OpenNI recordings (*.oni)")
+        if path:
+            self._deck.choose_path(Path(path))
+
+
+def _recording_name(camera_id: str) -> str:
+    kind, _, address = camera_id.partition(":")
+    name = Path(address).name
+    return (
+        f"Recording {name}" if kind == "recording" else f"Capture folder {name}" if kind == "folder" else name
+    )
