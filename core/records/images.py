@@ -61,13 +61,12 @@ def _decoded(data: bytes, draft_side: int | None = None) -> tuple[Image, str]:
 
     Every way in which the file can be bad is an `InputError`.
     """
-    # Pillow registers only the commonest formats by itself; these two must be imported to be known.
-    from PIL import Image, MpoImagePlugin, TiffImagePlugin  # noqa: F401
+    from PIL import Image
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            image = Image.open(io.BytesIO(data), formats=["JPEG", "MPO", "PNG", "TIFF"])
+            image = Image.open(io.BytesIO(data), formats=["JPEG", "PNG", "TIFF"])
             width, height = image.size
             file_format = str(image.format)
             if draft_side is not None and file_format in ("JPEG", "MPO"):
