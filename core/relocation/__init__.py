@@ -1,0 +1,50 @@
+"""Relocation: the lesions of a first visit in the pictures of a follow-up."""
+
+from core.relocation.registry import (
+    DEFAULT_METHOD,
+    RELOCATION_METHODS,
+    MethodContext,
+    MethodOutcome,
+    RelocationMethod,
+    register_relocation_method,
+    relocation_method,
+)
+from core.relocation.relocate import pick_query, relocate, relocate_visit
+from core.relocation.result_json import read_lesions, write_json
+from core.relocation.types import (
+    DEFAULT_DELTA_M,
+    Candidate,
+    Estimate,
+    LesionQuery,
+    LesionStatus,
+    Region,
+    RelocatedLesion,
+    RelocationOptions,
+    RelocationResult,
+    Spot,
+)
+
+__all__ = [
+    "DEFAULT_DELTA_M",
+    "DEFAULT_METHOD",
+    "RELOCATION_METHODS",
+    "Candidate",
+    "Estimate",
+    "LesionQuery",
+    "LesionStatus",
+    "MethodContext",
+    "MethodOutcome",
+    "Region",
+    "RelocatedLesion",
+    "RelocationMethod",
+    "RelocationOptions",
+    "RelocationResult",
+    "Spot",
+    "pick_query",
+    "read_lesions",
+    "register_relocation_method",
+    "relocate",
+    "relocate_visit",
+    "relocation_method",
+    "write_json",
+]

@@ -1,0 +1,151 @@
+"""``geoderm relocate``: the lesions of a first visit in the capture of a follow-up."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from core.errors import InputError, WorkError
+
+if TYPE_CHECKING:
+    from core.anchors import AnalysedCapture
+    from core.capture import RgbdCapture
+    from core.relocation import LesionQuery
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("relocate")(relocate_command)
+
+
+def relocate_command(
+    first: Path = typer.Argument(..., help="Capture folder of the first visit, or a folder of them."),
+    followup: Path = typer.Argument(..., help="Capture folder of the follow-up, or a folder of them."),
+    lesions: Path = typer.Option(..., "--lesions", help="lesions.json: places in the first visit's picture."),
+    out: Path = typer.Option(..., "--out", help="result.json to write."),
+    method: str = typer.Option("", "--method", help="Relocation method (default: the best shipped)."),
+    no_appearance: bool = typer.Option(False, "--no-appearance", help="Geometry alone: never match colour."),
+    seed: int = typer.Option(0, "--seed", min=0, help="Seed of every random draw."),
+    delta_m: float = typer.Option(0.0, "--delta-m", help="Half width of a voting band in metres."),
+    explain: Path | None = typer.Option(
+        None, "--explain", help="Folder for pictures explaining every lesion."
+    ),
+) -> None:
+    """Find the lesions of FIRST again in FOLLOWUP."""
+    from core.capture import read_visit
+    from core.relocation import (
+        DEFAULT_DELTA_M,
+        DEFAULT_METHOD,
+        RelocationOptions,
+        read_lesions,
+        relocate_visit,
+        relocation_method,
+        write_json,
+    )
+
+    start = time.perf_counter()
+    method = method or DEFAULT_METHOD
+    relocation_method(method)
+    options = RelocationOptions(delta_m=delta_m if delta_m != 0.0 else DEFAULT_DELTA_M)
+    queries = read_lesions(lesions)
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
+    first_visit, followup_visit = read_visit(first), read_visit(followup)
+    _check_pixels(lesions, queries, dict(first_visit))
+    read = time.perf_counter()
+    wanted = {q.capture for q in queries if q.capture is not None} or {name for name, _ in first_visit}
+    analysed1, _ = _analyse([(n, c) for n, c in first_visit if n in wanted] if queries else [])
+    analysed2, warnings = _analyse(followup_visit if queries else [])
+    analysed = time.perf_counter()
+    result = relocate_visit(
+        analysed1,
+        analysed2,
+        queries,
+        method=method,
+        appearance=not no_appearance,
+        seed=seed,
+        options=options,
+    )
+    document = result.to_json()
+    if len(first_visit) == 1 and len(followup_visit) == 1 and not any(q.capture for q in queries):
+        for entry in document["lesions"] if isinstance(document["lesions"], list) else []:
+            entry.pop("capture", None)
+    document["warnings"] = [*warnings, *result.warnings]
+    document["seconds"] = {
+        **{name: round(value, 4) for name, value in result.seconds.items() if name != "total"},
+        "reading": round(read - start, 4),
+        "analysis": round(analysed - read, 4),
+        "total": round(time.perf_counter() - start, 4),
+    }
+    write_json(out, document)
+    if explain is not None:
+        _explain(explain, analysed1, analysed2, queries, options)
+
+
+def _check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[str, RgbdCapture]) -> None:
+    """Every lesion names a capture and lies inside its image; otherwise the file and the field are named."""
+    for i, query in enumerate(queries):
+        if query.capture is not None and query.capture not in captures:
+            raise InputError(
+                f'{file}: field "lesions[{i}].capture": FIRST has no capture "{query.capture}".',
+                f"Choose one of: {', '.join(captures)}.",
+            )
+        if query.capture is None and len(captures) > 1:
+            raise InputError(
+                f'{file}: field "lesions[{i}].capture" is missing although FIRST holds several captures.',
+                f"Choose one of: {', '.join(captures)}.",
+            )
+        rig = captures[query.capture if query.capture is not None else next(iter(captures))].rig
+        camera, key, pixel = (
+            (rig.picture_camera, "pixel", query.pixel)
+            if query.pixel is not None
+            else (rig.depth, "depth_pixel", query.depth_pixel)
+        )
+        if not camera.contains(pixel)[0]:
+            raise InputError(
+                f'{file}: field "lesions[{i}].{key}": {list(pixel or ())} lies outside the '
+                f"{camera.width} x {camera.height} image."
+            )
+
+
+def _analyse(captures: list[tuple[str, RgbdCapture]]) -> tuple[dict[str, AnalysedCapture], list[str]]:
+    """Analysed captures by name. In a visit of several, one that shows no body is a warning."""
+    from core.anchors import analyse_capture
+    from devices.trackers import default_tracker
+
+    out: dict[str, AnalysedCapture] = {}
+    warnings: list[str] = []
+    for name, capture in captures:
+        try:
+            out[name] = analyse_capture(capture, default_tracker())
+        except WorkError as error:
+            if len(captures) == 1:
+                raise
+            warnings.append(f"{name}: {error.message}")
+    if captures and not out:
+        raise WorkError("No body was found in any capture.", "Capture again with the whole body in view.")
+    return out, warnings
+
+
+def _explain(
+    folder: Path,
+    first: dict[str, AnalysedCapture],
+    followup: dict[str, AnalysedCapture],
+    queries: tuple[LesionQuery, ...],
+    options: object,
+) -> None:
+    from core.relocation import RelocationOptions
+    from core.relocation.explain import explain_lesion
+    from core.relocation.explain_files import write_explanation
+
+    assert isinstance(options, RelocationOptions)
+    for query in queries:
+        source = first[query.capture if query.capture is not None else next(iter(first))]
+        for name, target in followup.items():
+            explanation = explain_lesion(source, target, query, options=options)
+            if explanation is not None:
+                prefix = query.id if len(followup) == 1 else f"{query.id}-{name}"
+                write_explanation(explanation, source, target, folder, prefix)

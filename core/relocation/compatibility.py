@@ -1,0 +1,58 @@
+"""Whether two captures can be compared at all: the same side of the same person, with enough anchors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.geodesics import GeodesicFields
+from core.relocation.bones import torso_rotation
+from core.relocation.field_store import FIELDS
+from core.relocation.pair import VisitPair, anchor_points
+from core.relocation.signatures import LEAST_ANCHORS
+
+FloatArray = NDArray[np.float64]
+
+OPPOSITE_DEG = 110.0
+"""A trunk turned farther shows other skin."""
+SIZE_DIFFERENCE = 0.12
+"""Median relative difference of inter-anchor geodesics beyond which it is another person."""
+SHAPE_DIFFERENCE = 0.22
+"""Median absolute deviation from that median: the same, for people of one size."""
+PAIR_LEAST_M = 0.15
+
+
+def why_not(pair: VisitPair) -> str:
+    """Why these captures carry no answer for any lesion; empty when they do."""
+    rotation = torso_rotation(pair)
+    if rotation is not None:
+        angle = np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0)))
+        if angle > OPPOSITE_DEG:
+            return f"The two captures show different sides of the body (turned by {angle:.0f} degrees)."
+    count = len(pair.joint_names)
+    if count < LEAST_ANCHORS:
+        return f"Only {count} anchors were found in both captures; {LEAST_ANCHORS} are needed."
+    names = pair.joint_names
+    first = FIELDS.fields(pair.first.scan.surface, anchor_points(pair.first, names), "virtual-source")
+    second = FIELDS.fields(pair.followup.scan.surface, anchor_points(pair.followup, names), "virtual-source")
+    size, shape, pairs = proportions(pair, first, second)
+    if pairs >= 6 and abs(size) > SIZE_DIFFERENCE:
+        word = "larger" if size > 0 else "smaller"
+        return f"The follow-up shows another person: its body distances are {abs(size):.0%} {word}."
+    if pairs >= 15 and shape > SHAPE_DIFFERENCE:
+        return "The follow-up shows another person: the body's proportions disagree with the first visit."
+    return ""
+
+
+def proportions(pair: VisitPair, first: GeodesicFields, second: GeodesicFields) -> tuple[float, float, int]:
+    """Median relative difference of inter-anchor geodesics, its absolute deviation, number of pairs."""
+    one = first.at([pair.first.anchors[n].point for n in first.names])
+    two = second.at([pair.followup.anchors[n].point for n in second.names])
+    upper = np.triu_indices(len(one), 1)
+    a, b = one[upper], two[upper]
+    use = np.isfinite(a) & np.isfinite(b) & (a > PAIR_LEAST_M) & (b > PAIR_LEAST_M)
+    if not use.any():
+        return 0.0, 0.0, 0
+    ratio = np.log(b[use] / a[use])
+    middle = float(np.median(ratio))
+    return float(np.expm1(middle)), float(np.median(np.abs(ratio - middle))), int(use.sum())

@@ -1,0 +1,292 @@
+"""Finding the lesions of a first visit again in a follow-up: the way of the data from captures to answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from core.anchors import AnalysedCapture
+from core.errors import InputError
+from core.progress import Progress, ScaledProgress, no_progress
+from core.relocation.bones import Bone, bones
+from core.relocation.clock import PhaseClock
+from core.relocation.compatibility import why_not
+from core.relocation.pair import PickedLesion, VisitPair
+from core.relocation.registry import DEFAULT_METHOD, MethodContext, MethodOutcome, relocation_method
+from core.relocation.types import (
+    Candidate,
+    Estimate,
+    LesionQuery,
+    LesionStatus,
+    RelocatedLesion,
+    RelocationOptions,
+    RelocationResult,
+)
+from core.relocation.visibility import turned_away
+from core.surface import SkinPick, pick_skin, pick_skin_depth
+
+
+def relocate(
+    first: AnalysedCapture,
+    followup: AnalysedCapture,
+    queries: Sequence[LesionQuery],
+    *,
+    method: str = DEFAULT_METHOD,
+    appearance: bool = True,
+    seed: int = 0,
+    options: RelocationOptions | None = None,
+    progress: Progress = no_progress,
+) -> RelocationResult:
+    """Find lesions of one capture again in another.
+
+    Parameters
+    ----------
+    first, followup : AnalysedCapture
+    queries : sequence of LesionQuery
+        With pixels of ``first``'s picture.
+    method : str
+        A key of `core.relocation.RELOCATION_METHODS`.
+    appearance : bool
+        Whether colour may be used for matching.
+    seed : int
+        Of every random draw, so that a result can be repeated.
+
+    Returns
+    -------
+    RelocationResult
+        One answer per query, in their order.
+
+    Raises
+    ------
+    InputError
+        Unknown method, or a pixel outside the picture.
+    Cancelled
+        Through ``progress``.
+    """
+    chosen = relocation_method(method)
+    options = options or RelocationOptions()
+    clock = PhaseClock()
+    progress(0.0, "Placing the lesions on the skin")
+    with clock.phase("lesions"):
+        picks = [pick_query(first, query) for query in queries]
+    placed = [
+        PickedLesion(q, p.point, p.normal)
+        for q, p in zip(queries, picks, strict=True)
+        if p.point is not None and p.normal is not None
+    ]
+    pair = VisitPair(first, followup)
+    outcome, obstacle = MethodOutcome(()), ""
+    if placed:
+        progress(0.05, "Comparing the captures")
+        with clock.phase("geodesics"):
+            obstacle = why_not(pair)
+        if not obstacle:
+            context = MethodContext(options, appearance, seed, clock, ScaledProgress(progress, 0.1, 0.95))
+            outcome = chosen.estimate(pair, placed, context)
+    with clock.phase("visibility"):
+        skeleton = bones(pair) if options.check_visibility and placed and not obstacle else ()
+        estimates = dict(
+            zip((p.query.id for p in placed), zip(placed, outcome.estimates, strict=False), strict=False)
+        )
+        lesions = tuple(
+            _refused(query, pick.reason or "The click is not on the skin.")
+            if pick.point is None
+            else _refused(query, obstacle)
+            if obstacle
+            else _answer(pair, *estimates[query.id], skeleton, options)
+            for query, pick in zip(queries, picks, strict=True)
+        )
+    progress(1.0, "Done")
+    warnings = tuple(
+        dict.fromkeys(
+            (
+                *(f"First visit: {w}" for w in first.warnings),
+                *(f"Follow-up: {w}" for w in followup.warnings),
+                *(f"Lesion {q.id}: {w}" for q, p in zip(queries, picks, strict=True) for w in p.warnings),
+                *outcome.warnings,
+            )
+        )
+    )
+    return RelocationResult(
+        chosen.name, lesions, clock.seconds(), warnings, outcome.new_spots, outcome.vanished_spots
+    )
+
+
+def pick_query(first: AnalysedCapture, query: LesionQuery) -> SkinPick:
+    """The skin under a query's pixel.
+
+    Raises
+    ------
+    InputError
+        If the pixel is outside the image.
+    """
+    head = first.skeleton.joints.get("head")
+    head_m = None if head is None else head.point_m
+    rig = first.capture.rig
+    pixel, camera, field = (
+        (query.pixel, rig.picture_camera, "pixel")
+        if query.pixel is not None
+        else (query.depth_pixel, rig.depth, "depth_pixel")
+    )
+    assert pixel is not None
+    if not np.isfinite(pixel).all() or not camera.contains(pixel)[0]:
+        raise InputError(
+            f'Lesion "{query.id}": {field} [{pixel[0]:g}, {pixel[1]:g}] is outside the first visit\'s image '
+            f"({camera.width} x {camera.height})."
+        )
+    pick = pick_skin if query.pixel is not None else pick_skin_depth
+    return pick(first.scan, pixel, head_m=head_m)
+
+
+def relocate_visit(
+    first: Mapping[str, AnalysedCapture],
+    followup: Mapping[str, AnalysedCapture],
+    queries: Sequence[LesionQuery],
+    *,
+    method: str = DEFAULT_METHOD,
+    appearance: bool = True,
+    seed: int = 0,
+    options: RelocationOptions | None = None,
+    progress: Progress = no_progress,
+) -> RelocationResult:
+    """Find lesions of a visit of several captures again in another visit.
+
+    Every lesion is searched in the follow-up's captures, its own view first; the surest answer counts.
+
+    Raises
+    ------
+    InputError
+        If a query names no capture of the first visit, or none although there are several.
+    """
+    clock = PhaseClock()
+    owners = {query.id: _owner(first, query) for query in queries}
+    seconds: dict[str, float] = {}
+    warnings: list[str] = []
+    best: dict[str, RelocatedLesion] = {}
+    turns = [(a, b) for a in first for b in _by_view(first[a], followup) if a in owners.values()]
+    for turn, (a, b) in enumerate(turns):
+        wanted = [q for q in queries if owners[q.id] == a and not _settled(best.get(q.id))]
+        if not wanted:
+            continue
+        part = ScaledProgress(progress, turn / len(turns), (turn + 1) / len(turns))
+        result = relocate(
+            first[a],
+            followup[b],
+            wanted,
+            method=method,
+            appearance=appearance,
+            seed=seed,
+            options=options,
+            progress=part,
+        )
+        warnings.extend(result.warnings)
+        for name, value in result.seconds.items():
+            seconds[name] = seconds.get(name, 0.0) + value
+        for lesion in result.lesions:
+            if lesion.id not in best or _rank(lesion) > _rank(best[lesion.id]):
+                best[lesion.id] = replace(lesion, capture=b)
+    seconds["total"] = clock.seconds()["total"]
+    relocation_method(method)
+    return RelocationResult(
+        method, tuple(best[q.id] for q in queries), seconds, tuple(dict.fromkeys(warnings))
+    )
+
+
+def _owner(first: Mapping[str, AnalysedCapture], query: LesionQuery) -> str:
+    if query.capture is None and len(first) == 1:
+        return next(iter(first))
+    if query.capture is None:
+        raise InputError(
+            f'Lesion "{query.id}": the first visit has several captures; field "capture" must name one.',
+            f"Choose one of: {', '.join(first)}.",
+        )
+    if query.capture not in first:
+        raise InputError(
+            f'Lesion "{query.id}": field "capture" names "{query.capture}", not in the first visit.',
+            f"Choose one of: {', '.join(first)}.",
+        )
+    return query.capture
+
+
+def _by_view(own: AnalysedCapture, followup: Mapping[str, AnalysedCapture]) -> list[str]:
+    return sorted(followup, key=lambda name: followup[name].capture.view != own.capture.view)
+
+
+def _settled(lesion: RelocatedLesion | None) -> bool:
+    return lesion is not None and lesion.status in ("found", "predicted")
+
+
+_STATUS_RANK: dict[LesionStatus, int] = {
+    "found": 4,
+    "predicted": 3,
+    "ambiguous": 2,
+    "not_visible": 1,
+    "refused": 0,
+}
+
+
+def _rank(lesion: RelocatedLesion) -> tuple[int, float]:
+    return _STATUS_RANK[lesion.status], lesion.confidence
+
+
+def _refused(query: LesionQuery, reason: str) -> RelocatedLesion:
+    return RelocatedLesion(query.id, "refused", reason)
+
+
+LEAST_CONFIDENCE = 0.1
+"""An answer below is no answer."""
+
+
+def _answer(
+    pair: VisitPair,
+    lesion: PickedLesion,
+    estimate: Estimate,
+    skeleton: tuple[Bone, ...],
+    options: RelocationOptions,
+) -> RelocatedLesion:
+    query = lesion.query
+    if estimate.point_m is None:
+        return _refused(query, estimate.reason or "The evidence carries no answer.")
+    if options.check_visibility and not estimate.appearance_matched:
+        hidden = estimate.hidden or turned_away(lesion, skeleton)
+        if hidden:
+            return RelocatedLesion(query.id, "not_visible", hidden)
+        if estimate.confidence < LEAST_CONFIDENCE:
+            return _refused(query, "The anchors disagree about the place.")
+    rig = pair.followup.capture.rig
+    status: LesionStatus = "predicted"
+    reason = estimate.reason or "Computed from distances along the skin; not compared with the picture."
+    if estimate.appearance_matched:
+        status, reason = "found", estimate.reason or "Seen again in the picture."
+    elif estimate.candidates:
+        status = "ambiguous"
+        reason = f"{1 + len(estimate.candidates)} places explain the distances almost equally well."
+    return RelocatedLesion(
+        id=query.id,
+        status=status,
+        reason=reason,
+        point_m=estimate.point_m,
+        pixel=estimate.pixel or _pair_of(rig.project_to_picture(estimate.point_m)[0]),
+        depth_pixel=_pair_of(rig.depth.project(estimate.point_m)[0]),
+        radius95_m=estimate.radius95_m,
+        confidence=estimate.confidence,
+        appearance_matched=estimate.appearance_matched,
+        candidates=tuple(
+            Candidate(
+                c.point_m,
+                c.confidence,
+                _pair_of(rig.project_to_picture(c.point_m)[0]),
+                _pair_of(rig.depth.project(c.point_m)[0]),
+            )
+            for c in estimate.candidates
+        ),
+        region=estimate.region,
+        agreement_m=estimate.agreement_m,
+        picture="color" if rig.has_color else "depth",
+    )
+
+
+def _pair_of(pixel: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[float, float]:
+    return float(pixel[0]), float(pixel[1])

@@ -1,0 +1,86 @@
+"""The signature of a lesion: its geodesic distances to the anchors (thesis, chapter 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.geodesics import GeodesicFields
+from core.relocation.pair import PickedLesion
+
+FloatArray = NDArray[np.float64]
+
+LEAST_ANCHORS = 4
+"""Two distances meet in two places; a third decides, a fourth shows an error."""
+
+
+@dataclass(frozen=True, eq=False)
+class LesionSignature:
+    """Distances of one lesion along the skin.
+
+    Attributes
+    ----------
+    lesion_id : str
+    names : tuple of str (a)
+        The anchors.
+    distances_m : ndarray (a,)
+        inf where the skin between anchor and lesion was not seen connected.
+    sigma_m : ndarray (a,)
+        Spread of each distance between visits.
+    position_m : ndarray (3,)
+        In the first visit's depth-camera frame.
+    """
+
+    lesion_id: str
+    names: tuple[str, ...]
+    distances_m: FloatArray
+    sigma_m: FloatArray
+    position_m: FloatArray
+
+    @property
+    def reached(self) -> int:
+        """Number of anchors that the lesion is connected to."""
+        return int(np.isfinite(self.distances_m).sum())
+
+
+def lesion_signatures(
+    fields: GeodesicFields,
+    lesions: Sequence[PickedLesion],
+    anchor_sigma_m: FloatArray,
+    stretch: float,
+    *,
+    at_vertices: bool = False,
+) -> tuple[LesionSignature, ...]:
+    """Signatures of lesions on the surface of the fields.
+
+    Parameters
+    ----------
+    fields : GeodesicFields
+        Of the first visit.
+    anchor_sigma_m : ndarray (a,)
+        What each anchor adds to the spread.
+    stretch : float
+        Share of a distance that a change of stance may add or take (METHOD section 3).
+    at_vertices : bool
+        Read the nearest depth pixel (the thesis) instead of the point between vertices.
+    """
+    if not lesions:
+        return ()
+    if at_vertices:
+        corners = [fields.triangles[p.point.triangle][int(np.argmax(p.point.barycentric))] for p in lesions]
+        distances = fields.distances[:, np.array(corners)]
+    else:
+        distances = fields.at([p.point for p in lesions])
+    return tuple(
+        LesionSignature(
+            lesion.query.id,
+            fields.names,
+            column,
+            np.hypot(anchor_sigma_m, stretch * np.where(np.isfinite(column), column, 0.0)),
+            np.asarray(lesion.point.position_m),
+        )
+        for lesion, column in zip(lesions, distances.T, strict=True)
+    )
