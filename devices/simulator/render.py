@@ -47,7 +47,7 @@ class Exposure:
 
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     noise: float = 0.010
-    blur_px: float = 0.6
+    blur_px: float = 0.75
 
 
 def render_picture(

@@ -124,15 +124,14 @@ def _clothes(
         hem = np.full(len(p), hip - 0.42 * (hip - knee))
     lower = np.minimum(waist - z, z - hem)
     inside = lower
+    inside -= 0.4 * np.clip(arm - 0.15, 0.0, 1.0)
     if wardrobe == "shorts_top":
         low, high = hip + 0.50 * (neck - hip), hip + 0.72 * (neck - hip)
-        band = np.minimum(z - low, high - z)
-        strap = np.minimum(0.020 * scale - np.abs(x - 0.085 * scale), z - low)
-        inside = np.maximum(
-            lower,
-            np.where(model.bone_weight("head", "neck02", "neck03") > 0.3, -0.05, np.maximum(band, strap)),
-        )
-    return np.asarray(inside - 0.4 * np.clip(arm - 0.15, 0.0, 1.0)), colors
+        band = np.minimum(z - low, high - z) - 0.4 * np.clip(arm - 0.35, 0.0, 1.0)
+        strap = np.minimum(0.016 * scale - np.abs(x - 0.075 * scale), z - low)
+        on_head = model.bone_weight("head", "neck02", "neck03") > 0.3
+        inside = np.maximum(inside, np.where(on_head, -0.05, np.maximum(band, strap)))
+    return np.asarray(inside), colors
 
 
 def _scalp(model: BodyModel) -> FloatArray:
