@@ -51,7 +51,9 @@ def simulated_patient() -> SimulatedPatient:
     """The person behind the prepared patient; the lesions change a little at the second visit."""
     from devices.simulator import SimulatedPatient, VisitChange
 
-    return SimulatedPatient(BODY, BODY_SEED, changes={2: VisitChange(new_moles=2, growth={"L03": 1.35})})
+    return SimulatedPatient(
+        BODY, BODY_SEED, lesions=60, changes={2: VisitChange(new_moles=2, growth={"L03": 1.35})}
+    )
 
 
 def sample_lesions(truth: CaptureTruth, lesion_ids: tuple[str, ...], count: int) -> list[str]:
