@@ -174,14 +174,23 @@ def _read_camera(owner: Fields) -> PinholeCamera:
         camera = PinholeCamera(width, height, fx, fy, cx, cy, distortion)
     except InputError as error:
         raise fields.error("distortion", f"is wrong. {error.message}") from error
-    u, v = np.meshgrid(np.linspace(0, width - 1, 9), np.linspace(0, height - 1, 9))
-    rays = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
-    if not np.isfinite(rays).all() or float(np.abs(rays).max()) > _MAX_RAY:
+    if not _is_invertible(camera):
         name = "distortion" if any(distortion) else "fx"
         raise fields.error(
             name, "sends pixels of the image out of the field of view.", "Calibrate the camera again."
         )
     return camera
+
+
+def _is_invertible(camera: PinholeCamera) -> bool:
+    """Whether pixels all over the image have rays that lead back to them."""
+    u, v = np.meshgrid(np.linspace(0, camera.width - 1, 9), np.linspace(0, camera.height - 1, 9))
+    pixels = np.stack([u.ravel(), v.ravel()], axis=1)
+    rays = camera.rays(pixels)
+    if not np.isfinite(rays).all() or float(np.abs(rays).max()) > _MAX_RAY:
+        return False
+    back = camera.project(rays)
+    return bool(np.isfinite(back).all() and np.abs(back - pixels).max() < 1.0)
 
 
 def _read_depth(folder: Path, fields: Fields, camera: PinholeCamera) -> tuple[NDArray[np.uint16], float]:

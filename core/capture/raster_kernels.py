@@ -51,18 +51,10 @@ def draw_grid(
     """Draw the quads of a depth grid (h, w) into a z-buffer ``out`` of the other camera (0 = nothing).
 
     ``pixels`` (h, w, 2) and ``seen_depth`` (h, w) say where each grid point lies in the other camera. Quads
-    across a depth jump are not drawn; single points are, so that nothing measured is lost.
+    across a depth jump are not drawn; points fill what is left empty, so that nothing measured is lost.
     """
     h, w = depth.shape
     height, width = out.shape
-    for v in range(h):
-        for u in range(w):
-            if depth[v, u] > 0.0 and seen_depth[v, u] > 0.0 and np.isfinite(pixels[v, u, 0]):
-                fx, fy = np.rint(pixels[v, u, 0]), np.rint(pixels[v, u, 1])
-                if 0 <= fx < width and 0 <= fy < height:
-                    x, y = int(fx), int(fy)
-                    if out[y, x] == 0.0 or seen_depth[v, u] < out[y, x]:
-                        out[y, x] = seen_depth[v, u]
     for v in range(h - 1):
         for u in range(w - 1):
             low, high, ok = np.inf, 0.0, True
@@ -88,3 +80,12 @@ def draw_grid(
                     pixels[v + 1, u, 1],
                     seen_depth[v + 1, u],
                 )
+    drawn = out.copy()
+    for v in range(h):
+        for u in range(w):
+            if depth[v, u] > 0.0 and seen_depth[v, u] > 0.0 and np.isfinite(pixels[v, u, 0]):
+                fx, fy = np.rint(pixels[v, u, 0]), np.rint(pixels[v, u, 1])
+                if 0 <= fx < width and 0 <= fy < height:
+                    x, y = int(fx), int(fy)
+                    if drawn[y, x] == 0.0 and (out[y, x] == 0.0 or seen_depth[v, u] < out[y, x]):
+                        out[y, x] = seen_depth[v, u]
