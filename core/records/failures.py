@@ -49,6 +49,8 @@ _OS_FAILURES: dict[int, tuple[str, str]] = {
     errno.EPERM: _READ_ONLY,
     errno.ENOENT: _GONE,
     errno.ENOTDIR: _GONE,
+    errno.EEXIST: ("A file stands where {place} should be.", "Choose another folder."),
+    errno.EISDIR: ("A folder stands where a file of {place} should be.", "Choose another folder."),
     errno.ENODEV: _GONE,
     errno.ENXIO: _GONE,
     errno.ESTALE: _GONE,

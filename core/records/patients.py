@@ -108,15 +108,13 @@ class Patients:
                 .group_by(VisitRow.patient_id)
             )
         }
-        lesions: dict[int, int] = dict(
-            session.execute(
-                select(LesionRow.patient_id, func.count())
-                .where(LesionRow.patient_id.in_(ids))
-                .group_by(LesionRow.patient_id)
-            )
-            .tuples()
-            .all()
-        )
+        lesions: dict[int, int] = {}
+        for patient_id, count in session.execute(
+            select(LesionRow.patient_id, func.count())
+            .where(LesionRow.patient_id.in_(ids))
+            .group_by(LesionRow.patient_id)
+        ):
+            lesions[patient_id] = count
         summaries = []
         for row in rows:
             count, last = visits.get(row.id, (0, None))

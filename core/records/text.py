@@ -14,7 +14,10 @@ _SILENT = {"'", "’", "ʼ", "`", "´", "ʹ"}
 
 def search_form(text: str) -> str:
     """Text without accents, case and punctuation: ``"Nguyễn-O'Brien"`` gives ``"nguyen obrien"``."""
-    plain = "".join(c for c in unicodedata.normalize("NFKD", text.casefold()) if not unicodedata.combining(c))
+    plain = text
+    for _ in range(2):  # folding case makes new letters to decompose, and the other way round
+        plain = unicodedata.normalize("NFKD", plain).casefold()
+    plain = "".join(c for c in unicodedata.normalize("NFKD", plain) if not unicodedata.combining(c))
     plain = "".join(c for c in plain.translate(_LETTERS) if c not in _SILENT)
     return " ".join("".join(c if c.isalnum() else " " for c in plain).split())
 
