@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Final, Literal
 
 import cv2
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors.names import LANDMARK_NAMES, OPPOSITE_LANDMARKS
-from core.anchors.relief import LAMPS, shade_depth
+from core.anchors.relief import shade_depths
 from core.anchors.skeleton import VISIBLE, PoseLandmarks, SkeletonTracker
 from core.surface import BodyScan
 
@@ -23,10 +24,14 @@ CROP_SIZE: Final = 640
 CROP_SCALES: Final = (1.24, 1.55)
 """Sides of the crop relative to the longer side of the body's box."""
 
+CLOSE_UP: Final = 4.5
+"""Side of a close-up of head and shoulders, in widths of the shoulders."""
+
 _DARK_LEVEL: Final = 40.0
 _FLAT_LEVEL: Final = 9.0
 _LEFT_SHOULDER: Final = LANDMARK_NAMES.index("left_shoulder")
 _RIGHT_SHOULDER: Final = LANDMARK_NAMES.index("right_shoulder")
+_UPPER_BODY: Final = np.arange(len(LANDMARK_NAMES)) < LANDMARK_NAMES.index("left_hip")
 _OPPOSITE: Final = np.array(OPPOSITE_LANDMARKS)
 
 
@@ -81,24 +86,61 @@ def detect_pose(scan: BodyScan, tracker: SkeletonTracker) -> Detection | None:
 def detect_in_relief(scan: BodyScan, tracker: SkeletonTracker, *, thorough: bool) -> PoseLandmarks | None:
     """Landmarks in pixels of the depth image, from the shaded relief.
 
+    Close-ups of head and shoulders decide which side is left and help with the arms: in a relief of the whole
+    body the face is a few pixels, and the tracker then takes fronts for backs.
+
     Parameters
     ----------
     scan : BodyScan
     tracker : SkeletonTracker
     thorough : bool
-        True: several lamps, crops and mirror images, fused by `consensus`. False: one look.
+        True: all looks (lamps, crops, mirror images) fused by `consensus`, against the rare look that misses
+        a limb. False: the first look whose sides agree with the close-ups.
     """
-    depth, mask, camera = scan.fused.depth_m, scan.mask.mask, scan.surface.camera
+    images = shade_depths(scan.fused.depth_m, scan.mask.mask, scan.surface.camera)
     pixels = scan.surface.pixels.astype(np.float64)
-    looks: list[PoseLandmarks | None] = []
-    for lamp in LAMPS if thorough else LAMPS[:1]:
-        image = shade_depth(depth, mask, camera, lamp)
-        for scale in CROP_SCALES if thorough else CROP_SCALES[:1]:
-            square = _square(pixels, scale)
-            looks.append(_detect(image, square, tracker))
-            if thorough:
-                looks.append(_detect(image, square, tracker, mirror=True))
-    return consensus(looks)
+    squares = [_square(pixels, scale) for scale in CROP_SCALES]
+    looks: list[PoseLandmarks] = []
+    close: list[PoseLandmarks] = []
+    facing: bool | None = None
+    for k, (lamp, mirror) in enumerate(product(range(len(images)), (False, True))):
+        look = _detect(images[lamp], squares[(lamp + mirror) % len(squares)], tracker, mirror=mirror)
+        if look is None:
+            continue
+        looks.append(look)
+        if not close:
+            close = _close_ups(images, look, tracker)
+            facing = 2 * sum(map(_faces, close)) > len(close) if close else None
+        if not thorough and (facing is None or _faces(look) == facing or k == 3):
+            break
+    return consensus([*looks, *close], facing)
+
+
+def _close_ups(
+    images: Sequence[NDArray[np.uint8]], look: PoseLandmarks, tracker: SkeletonTracker
+) -> list[PoseLandmarks]:
+    """Looks at head, shoulders and arms under every lamp; what lies outside them is not visible."""
+    shoulders = look.pixels[[_LEFT_SHOULDER, _RIGHT_SHOULDER]]
+    middle = shoulders.mean(0)
+    width = float(np.linalg.norm(shoulders[0] - shoulders[1]))
+    if width < 8.0:
+        return []
+    square = (float(middle[0]), float(middle[1]) + 0.15 * width, CLOSE_UP * width)
+    found = [_detect(image, square, tracker, mirror=k % 2 == 1) for k, image in enumerate(images)]
+    reach = square[2] / 2
+    return [
+        PoseLandmarks(
+            at.pixels,
+            np.where((np.abs(at.pixels - square[:2]) < reach).all(1) & _UPPER_BODY, at.visibility, 0.0),
+        )
+        for at in found
+        if at is not None
+    ]
+
+
+def _faces(landmarks: PoseLandmarks) -> bool:
+    """Whether the person faces the camera: the left shoulder is on the right of the picture."""
+    return bool(landmarks.pixels[_LEFT_SHOULDER, 0] > landmarks.pixels[_RIGHT_SHOULDER, 0])
 
 
 def picture_fault(picture: NDArray[np.uint8], pixels: FloatArray) -> str:
@@ -125,28 +167,35 @@ def picture_fault(picture: NDArray[np.uint8], pixels: FloatArray) -> str:
     return ""
 
 
-def consensus(looks: Sequence[PoseLandmarks | None]) -> PoseLandmarks | None:
-    """Several looks at the same pixels as one: the median place, and less visibility where they differ.
+def consensus(looks: Sequence[PoseLandmarks], facing: bool | None = None) -> PoseLandmarks | None:
+    """Several looks at the same pixels as one: the mean near the median; less visible where they differ.
 
-    Looks that disagree about left and right are settled by the majority.
+    Parameters
+    ----------
+    looks : sequence of PoseLandmarks
+    facing : bool or None
+        Only looks at a person facing the camera (True) or turned away (False) count, if there are any;
+        None: the majority decides.
     """
-    seen = [look for look in looks if look is not None]
-    if not seen:
+    if not looks:
         return None
-    turned = [look.pixels[_LEFT_SHOULDER, 0] > look.pixels[_RIGHT_SHOULDER, 0] for look in seen]
-    majority = 2 * sum(turned) >= len(seen)
-    seen = [look for look, side in zip(seen, turned, strict=True) if side == majority]
+    sides = [_faces(look) for look in looks]
+    wanted = facing if facing in sides else 2 * sum(sides) >= len(looks)
+    seen = [look for look, side in zip(looks, sides, strict=True) if side == wanted]
     places = np.stack([look.pixels for look in seen])
     visibility = np.stack([look.visibility for look in seen])
-    middle = np.median(places, axis=0)
+    # a look that does not see a landmark has no say in its place while others see it
+    heard = visibility >= 0.5 * visibility.max(0)
+    middle = np.nanmedian(np.where(heard[..., None], places, np.nan), axis=0)
     size = float(np.ptp(middle, axis=0).max())
-    near = np.linalg.norm(places - middle, axis=-1) < 0.06 * size
+    near = heard & (np.linalg.norm(places - middle, axis=-1) < 0.06 * size)
     # among the looks near the median, the confident ones count more
     weight = np.where(near, visibility + 1e-3, 0.0)
     total = weight.sum(0)
     mean = np.einsum("kl,kld->ld", weight, places) / np.maximum(total, 1e-9)[:, None]
     place = np.where((total > 0)[:, None], mean, middle)
-    return PoseLandmarks(place, np.median(visibility, axis=0) * near.mean(0))
+    trust = np.nanmedian(np.where(heard, visibility, np.nan), axis=0) * near.sum(0) / heard.sum(0)
+    return PoseLandmarks(place, trust)
 
 
 def _clarity(landmarks: PoseLandmarks) -> float:

@@ -63,4 +63,4 @@ def find_skeleton(
         second = None if found.second is None else lift(found.second, other, capture.rig, scan.surface)
     if calibration is not None:
         skeleton = apply_calibration(skeleton, calibration, capture.rig)
-    return skeleton.with_warnings(*guard_left_right(skeleton, capture.view, second).warnings)
+    return skeleton.with_warnings(*guard_left_right(skeleton, capture.view, second, scan.surface).warnings)

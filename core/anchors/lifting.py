@@ -27,17 +27,17 @@ from core.surface import BodySurface
 FloatArray = NDArray[np.float64]
 
 INTERIOR_M: Final[dict[str, float]] = {
-    "head": 0.08,
+    "head": 0.10,
     "neck": 0.05,
     "torso": 0.10,
     "shoulder": 0.05,
     "elbow": 0.035,
     "hand": 0.015,
-    "hip": 0.09,
+    "hip": 0.115,
     "knee": 0.05,
     "foot": 0.035,
 }
-"""Skin to joint centre along the viewing ray, metres (METHOD section 4: tuned on rendered adults)."""
+"""Skin to joint centre along the viewing ray, metres (tuned on rendered adults)."""
 
 BONE_RANGE_M: Final[dict[str, tuple[float, float]]] = {
     "elbow": (0.14, 0.36),

@@ -6,6 +6,7 @@ recordings without colour, dark rooms, and as a second opinion.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import cv2
@@ -24,7 +25,7 @@ LAMPS: Final[tuple[tuple[float, float, float], ...]] = (
 """Directions towards lamps in camera axes (x right, y down, z away): upper left, upper right, in front."""
 
 _SKIN = np.array([226.0, 178.0, 150.0])
-_BACKGROUND = 118.0
+_BACKGROUND = 118
 _AMBIENT = 0.28
 
 
@@ -52,21 +53,34 @@ def shade_depth(
     ndarray (h, w, 3) uint8
         RGB.
     """
-    shape = (camera.height, camera.width)
+    return shade_depths(depth_m, mask, camera, (lamp,))[0]
+
+
+def shade_depths(
+    depth_m: FloatArray,
+    mask: NDArray[np.bool_],
+    camera: PinholeCamera,
+    lamps: Sequence[tuple[float, float, float]] = LAMPS,
+) -> list[NDArray[np.uint8]]:
+    """The same relief under several lamps, one image each; see `shade_depth`."""
     seen = mask & (depth_m > 0)
-    image = np.full((*shape, 3), _BACKGROUND)
+    plain = np.full((camera.height, camera.width, 3), _BACKGROUND, np.uint8)
     if not seen.any():
-        return image.astype(np.uint8)
+        return [plain for _ in lamps]
     filled = _fill(np.where(seen, depth_m, 0.0), seen)
     smooth = cv2.bilateralFilter(cv2.medianBlur(filled, 5), 7, 0.03, 3.0).astype(np.float64)
     normals = _normals(camera.pixel_rays * smooth[..., None])
-    towards = np.asarray(lamp) / np.linalg.norm(lamp)
-    light = np.clip(normals @ towards, 0.0, 1.0)
     near, far = np.percentile(depth_m[seen], [2.0, 98.0])
     haze = 1.0 - 0.25 * np.clip((smooth - near) / max(far - near, 0.2), 0.0, 1.0)
-    brightness = (_AMBIENT + (1.0 - _AMBIENT) * light) * haze
-    image[seen] = brightness[seen, None] * _SKIN
-    return np.asarray(np.clip(image, 0, 255), dtype=np.uint8)
+    images = []
+    for lamp in lamps:
+        towards = np.asarray(lamp) / np.linalg.norm(lamp)
+        light = np.clip(normals[seen] @ towards, 0.0, 1.0)
+        brightness = (_AMBIENT + (1.0 - _AMBIENT) * light) * haze[seen]
+        image = plain.copy()
+        image[seen] = np.clip(brightness[:, None] * _SKIN, 0, 255).astype(np.uint8)
+        images.append(image)
+    return images
 
 
 def _fill(depth: FloatArray, seen: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -18,7 +18,7 @@ TRACKERS: Final[dict[str, TrackerFactory]] = {}
 DEFAULT_TRACKER: Final = "mediapipe"
 
 _open: dict[str, SkeletonTracker] = {}
-_lock = threading.Lock()
+_lock = threading.RLock()  # a factory may build on another tracker
 
 
 def register_tracker(name: str, factory: TrackerFactory) -> None:

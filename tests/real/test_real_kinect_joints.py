@@ -31,7 +31,7 @@ def analysed_frame(frame: str) -> AnalysedCapture:
 
 
 def clicked_joint(capture: RgbdCapture, click: dict[str, object], name: str) -> np.ndarray:
-    """A clicked pixel in space: the depth under it, or as read off the image, plus the joint's depth inside."""
+    """A clicked pixel in space: the depth under it, or as read off the image, plus the depth inside."""
     u, v = click["pixel"]
     depth = click.get("surface_m")
     if depth is None:
