@@ -22,6 +22,7 @@ _RIM_M = 0.004
 _FARTHER_M = 0.03
 
 NOT_ON_BODY = "The click is not on the body."
+NOT_MEASURED = "The depth camera does not see this place; move so that both cameras see it."
 OUTSIDE_PICTURE = "The click is outside the picture."
 ON_HAIR = "The lesion lies on hair; the skin there cannot be seen or measured."
 ON_CLOTHING = "The lesion may lie on clothing; uncover the skin."
@@ -81,7 +82,7 @@ def _pick(scan: BodyScan, rig: CameraRig, pixel: FloatArray, head_m: ArrayLike |
     point, warnings = _rim_point(scan, origin, direction, through)
     if point is None:
         if not hits.hit[0]:
-            return SkinPick(None, None, NOT_ON_BODY)
+            return SkinPick(None, None, _miss(scan, origin, direction))
         point = scan.surface.point(int(hits.triangle[0]), hits.barycentric[0])
     verdict = judge_skin(scan, point.position_m, None if head_m is None else np.asarray(head_m, dtype=float))
     if verdict == "hair":
@@ -89,6 +90,15 @@ def _pick(scan: BodyScan, rig: CameraRig, pixel: FloatArray, head_m: ArrayLike |
     if verdict == "clothing":
         warnings = (*warnings, ON_CLOTHING)
     return SkinPick(point, scan.surface.normal_at(point), None, warnings)
+
+
+def _miss(scan: BodyScan, origin: FloatArray, direction: FloatArray) -> str:
+    """Why a ray misses: at the body's distance it is outside the depth image, or it passes the body."""
+    surface = scan.surface
+    middle = float(np.median(surface.vertices[:, 2]))
+    place = origin + (middle - origin[2]) / direction[2] * direction if direction[2] > 1e-6 else origin
+    pixel = surface.camera.project(place)
+    return NOT_ON_BODY if surface.camera.contains(pixel)[0] else NOT_MEASURED
 
 
 def _rim_point(

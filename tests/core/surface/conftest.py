@@ -15,7 +15,7 @@ HAIR = (35, 25, 20)
 WALL = (150, 155, 150)
 
 DEPTH = PinholeCamera(320, 240, 288.0, 288.0, 159.5, 119.5)
-COLOR = PinholeCamera(640, 480, 525.0, 525.0, 319.5, 239.5)
+COLOR = PinholeCamera(400, 300, 328.0, 328.0, 199.5, 149.5)
 RIG = CameraRig(DEPTH, COLOR, RigidTransform(np.eye(3), np.array([-0.025, 0.0, 0.0])))
 
 
@@ -29,7 +29,7 @@ class Part:
     color: tuple[int, int, int] = SKIN
 
 
-def person(x: float = 0.0, z: float = 2.2, *, shirt: bool = False, top: float = -0.75) -> list[Part]:
+def person(x: float = 0.0, z: float = 2.5, *, shirt: bool = False, top: float = -0.75) -> list[Part]:
     """A standing person with spread arms, camera at chest height, 1.7 m tall below ``top``."""
     trunk = SHIRT if shirt else SKIN
     parts = [
@@ -64,7 +64,7 @@ def _hit(part: Part, origin: np.ndarray, rays: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is in the room; ``walls`` and ``floor`` are planes ``normal . p = distance`` of the depth frame."""
+    """What is in the room; planes are ``normal . p = distance`` in the depth frame."""
 
     parts: Sequence[Part]
     planes: Sequence[tuple[tuple[float, float, float], float]] = ()
@@ -90,7 +90,7 @@ class Scene:
     def capture(
         self, frames: int = 4, seed: int = 0, *, color: bool = True, noise: float = 1.0
     ) -> RgbdCapture:
-        """What a Kinect-like camera records: noise grows with the square of depth; steep places are missing."""
+        """What a Kinect-like camera records: noise grows with the square of depth."""
         rng = np.random.default_rng(seed)
         z, _ = self.true_depth()
         sigma = noise * (0.0012 + 0.0019 * np.maximum(z - 0.4, 0.0) ** 2)
