@@ -11,6 +11,9 @@ from core.errors import InputError
 from core.geodesics.meshes import FloatArray, IntArray
 from core.geodesics.ply import read_ply
 
+_FARTHEST = 1e30
+"""Largest coordinate: squares of edge lengths must stay within the kernels' numbers."""
+
 
 def read_mesh(path: Path | str) -> tuple[FloatArray, IntArray]:
     """Read a mesh file; the format follows from the name's ending.
@@ -53,6 +56,12 @@ def _checked(path: Path, vertices: FloatArray, triangles: IntArray) -> tuple[Flo
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(bad):
         raise InputError(f"{path}: vertex {int(bad[0])} has a coordinate that is not a finite number.")
+    bad = np.flatnonzero((np.abs(vertices) > _FARTHEST).any(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{path}: vertex {int(bad[0])} has a coordinate beyond {_FARTHEST:g}, too large to measure with.",
+            "Export the mesh again.",
+        )
     bad = np.flatnonzero(((triangles < 0) | (triangles >= len(vertices))).any(axis=1))
     if len(bad):
         raise InputError(

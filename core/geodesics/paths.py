@@ -267,7 +267,7 @@ def trace_edge_path(
     target: SurfacePoint,
     source: Source | None = None,
 ) -> FloatArray:
-    """Trace the shortest path of a Dijkstra field, vertex by vertex along ``graph`` (start, neighbours, lengths).
+    """Trace the shortest path of a Dijkstra field from vertex to vertex along ``graph``.
 
     Returns
     -------

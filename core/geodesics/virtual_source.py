@@ -22,13 +22,10 @@ from core.geodesics.wedge_solver import WedgeSolver
 TOLERANCE = 1e-6
 """A vertex is only visited again when its distance shrinks by more than this share of the edge."""
 
-NEAR = 4.0
-"""Around the source, within this many edges, every triangle is tried from every vertex."""
-
 
 @numba.njit(nogil=True, cache=True, fastmath={"nsz", "arcp", "contract"}, error_model="numpy")
 def virtual_source_front(  # type: ignore[no-untyped-def]
-    start, corners, shape, bends, width, buckets, seeds, starts, rings, tolerance, d
+    start, corners, shape, bends, width, buckets, seeds, starts, tolerance, d
 ):
     """Fill ``d`` (n,) float64 with distances to one source given by ``seeds`` (3,) and ``starts`` (3,)."""
     n = d.shape[0]
@@ -40,7 +37,6 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
     ring, link = new_queue(n, buckets)
     queued = 0
     per_width = 1.0 / width
-    near = 0.0
     for i in range(seeds.shape[0]):
         v = np.uint32(seeds[i])
         if starts[i] < state[v, 0]:
@@ -50,8 +46,6 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
                 queued -= 1
             append(ring, link, v, np.uint32(np.int64(starts[i] * per_width) & (buckets - 1)))
             queued += 1
-        for k in range(start[v], start[v + np.uint32(1)]):
-            near = max(near, rings * max(shape[k, 0], shape[k, 1]))
     present = np.int64(0)
     while queued > 0:
         first = ring[np.uint32(present & (buckets - 1)), 0]
@@ -72,8 +66,10 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
                 lat = np.float64(shape[k, side])
                 lab = np.float64(shape[k, 1 - side])
                 lbt = np.float64(shape[k, 2])
-                # Behind a wide corner, and close to the source, the target may be due before the edge is.
-                early = da < near or lat * lat + lbt * lbt < lab * lab
+                # A target behind a wide corner, or close to the source, may be due before the edge's far end:
+                # when (t - source) and (t - b) make an angle of cosine less than |tb| / 2 |t - source|.
+                narrow = lat * lat + lbt * lbt - lab * lab
+                early = narrow < 0.0 or narrow * (da - sa - lat) <= lat * lbt * lbt
                 if dt <= da and (not early or dt <= da - lat):
                     continue
                 candidate = da + lat
@@ -120,5 +116,5 @@ class VirtualSourceSolver(WedgeSolver):
     def _front(self, seeds: IntArray, starts: FloatArray, out: FloatArray) -> None:
         w = self.wedges
         virtual_source_front(
-            w.start, w.corners, w.shape, w.bends, w.width, w.buckets, seeds, starts, NEAR, TOLERANCE, out
+            w.start, w.corners, w.shape, w.bends, w.width, w.buckets, seeds, starts, TOLERANCE, out
         )
