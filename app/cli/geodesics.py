@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from core.errors import InputError, WorkError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 def register(app: typer.Typer) -> None:
@@ -21,12 +26,12 @@ def geodesics(
     out: Path = typer.Option(..., help="NumPy file to write: floats [sources, vertices], inf = unreachable."),
 ) -> None:
     """Distances along a mesh from vertices, in the mesh's unit."""
-    import numpy as np
-
     from core.geodesics import geodesic_solver, read_mesh
 
     if out.suffix != ".npy":
         raise InputError(f"--out {out}: the name must end in .npy.")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: the folder does not exist.", "Create it or choose another.")
     numbers = _vertices(sources)
     vertices, triangles = read_mesh(mesh)
     for number in numbers:
@@ -35,12 +40,28 @@ def geodesics(
                 f"--sources {number}: {mesh} has only {len(vertices)} vertices, numbered from 0."
             )
     distances = geodesic_solver(vertices, triangles, method).distances(numbers)
-    try:
-        with out.open("wb") as file:
-            np.save(file, distances)
-    except OSError as error:
-        raise WorkError(f"{out}: cannot be written ({error.strerror or 'output error'}).") from error
+    _write_whole(out, distances)
     typer.echo(f"{len(numbers)} x {len(vertices)} distances written to {out}")
+
+
+def _write_whole(path: Path, distances: np.ndarray) -> None:
+    """Write the file whole or not at all."""
+    import numpy as np
+
+    temporary: Path | None = None
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+            temporary = Path(file.name)
+            np.save(file, distances)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise WorkError(
+            f"{path}: cannot be written ({error.strerror or 'output error'}).",
+            "Choose a folder that you may write to.",
+        ) from error
 
 
 def _vertices(text: str) -> list[int]:

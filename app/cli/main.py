@@ -10,6 +10,7 @@ import importlib
 import sys
 
 import typer
+from typer import TyperException
 
 from app.logs import log_bug
 from core.errors import GeodermError
@@ -50,13 +51,17 @@ def run(arguments: list[str] | None = None) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code."""
     try:
-        build_app()(args=arguments, prog_name="geoderm", standalone_mode=True)
+        code = build_app()(args=arguments, prog_name="geoderm", standalone_mode=False)
+        return code if isinstance(code, int) else 0
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else (0 if stop.code is None else 2)
     except GeodermError as error:
         sys.stderr.write(f"geoderm: {' '.join(str(error).split())}\n")
         return error.exit_code
-    except KeyboardInterrupt:
+    except TyperException as error:
+        sys.stderr.write(_wrong_use(error))
+        return 2
+    except (KeyboardInterrupt, typer.Abort):
         sys.stderr.write("geoderm: stopped\n")
         return 130
     except BrokenPipeError:
@@ -65,4 +70,13 @@ def main(arguments: list[str] | None = None) -> int:
         path = log_bug("command line")
         sys.stderr.write(f"geoderm: internal error; nothing was changed. Details are in {path}\n")
         return 3
-    return 0
+
+
+def _wrong_use(error: TyperException) -> str:
+    """One line for a wrong option or argument; the help where a command was called with nothing at all."""
+    told = error.format_message() if hasattr(error, "format_message") else str(error)
+    context = getattr(error, "ctx", None)
+    if type(error).__name__ == "NoArgsIsHelpError":
+        return f"{told}\n"
+    command = "geoderm" if context is None else context.command_path
+    return f"{command}: {' '.join(told.split())} (help: {command} --help)\n"
