@@ -52,7 +52,8 @@ def solve_shifts(
     """
     count = len(prior_m)
     one, two = np.triu_indices(count, 1)
-    residual = 0.5 * (followup[one, two] + followup[two, one]) - 0.5 * (first[one, two] + first[two, one])
+    with np.errstate(invalid="ignore"):  # a pair that is connected in neither visit: inf - inf
+        residual = 0.5 * (followup[one, two] + followup[two, one] - first[one, two] - first[two, one])
     usable = (
         np.isfinite(residual)
         & np.isfinite(slopes[one, two]).all(axis=1)

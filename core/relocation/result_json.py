@@ -60,6 +60,10 @@ def _query(path: Path, index: int, entry: object) -> LesionQuery:
         name = str(name)
     if not isinstance(name, str) or not name:
         raise InputError(f'{path}: field "{where}.id" must be a text.')
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise InputError(f'{path}: field "{where}.id" is not valid Unicode text.') from error
     capture = entry.get("capture")
     if capture is not None and not isinstance(capture, str):
         raise InputError(f'{path}: field "{where}.capture" must be the name of a capture.')
@@ -157,21 +161,20 @@ def write_json(path: Path, content: Mapping[str, object]) -> None:
         If the folder is missing, read-only or full.
     """
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    temporary: Path | None = None
     try:
         with tempfile.NamedTemporaryFile(
             "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
         ) as handle:
             temporary = Path(handle.name)
-            try:
-                handle.write(text)
-                handle.flush()
-                os.fsync(handle.fileno())
-            except OSError:
-                temporary.unlink(missing_ok=True)
-                raise
+            handle.write(text)
+            handle.flush()
+            os.fsync(handle.fileno())
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
         raise WorkError(
             f"{path}: cannot be written ({error.strerror or error}).",
             "Choose a folder that you may write to.",

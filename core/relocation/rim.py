@@ -27,7 +27,8 @@ def meeting_step(
     rim it points to the skin behind.
     """
     model = tangent_slopes(field.distances, surface.vertices, surface.normals, vertex)
-    residual = field.distances[:, vertex].astype(float) - signature.distances_m
+    with np.errstate(invalid="ignore"):  # an anchor that is connected in neither visit: inf - inf
+        residual = field.distances[:, vertex].astype(float) - signature.distances_m
     use = np.isfinite(residual) & np.isfinite(model.slopes).all(axis=1)
     if use.sum() < 3:
         return None
