@@ -7,11 +7,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from logging.handlers import RotatingFileHandler
-from pathlib import Path
 from types import TracebackType
-
-import platformdirs
 
 from core.errors import GeodermError
 
@@ -36,25 +32,6 @@ class TaskFailure:
     message: str
     advice: str
     is_bug: bool
-
-
-def log_path() -> Path:
-    """The log file in the user's log folder."""
-    return Path(platformdirs.user_log_dir("geoderm", appauthor=False)) / "geoderm.log"
-
-
-def start_logging(path: Path | None = None) -> Path:
-    """Write failures to ``path`` (default `log_path`), and return where they go. Calling twice is harmless."""
-    target = path or log_path()
-    for handler in LOGGER.handlers:
-        if isinstance(handler, RotatingFileHandler) and Path(handler.baseFilename) == target.absolute():
-            return target
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handler = RotatingFileHandler(target, maxBytes=500_000, backupCount=3, delay=True, encoding="utf-8")
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    LOGGER.addHandler(handler)
-    LOGGER.propagate = False
-    return target
 
 
 def trace_without_data(error: BaseException) -> str:

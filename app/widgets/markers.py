@@ -67,7 +67,9 @@ def _badge_font() -> QFont:
     return font
 
 
-def draw_marker(painter: QPainter, label: str, color: QColor, *, selected: bool, hovered: bool = False) -> None:
+def draw_marker(
+    painter: QPainter, label: str, color: QColor, *, selected: bool, hovered: bool = False
+) -> None:
     """Draw a marker with its lesion at the origin, in screen pixels."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     radius = RING_RADIUS + (3.0 if selected else 0.0)
