@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,6 +29,9 @@ def denoise_depth(depth_m: FloatArray, *, sigma_px: float = 1.5, gate_m: float =
     weights = np.exp(-(steps[:, None] + steps[None]) / (2.0 * sigma_px**2)).astype(np.float32)
     depth = np.pad(np.asarray(depth_m, dtype=np.float32), radius)
     inverse = np.divide(1.0, depth, out=np.zeros_like(depth), where=depth > 0)
+    # In a noisy single frame the gate must not sit on the pixel's own error.
+    median = cv2.medianBlur(depth, 5)
+    reference = np.where(np.abs(median - depth) < gate_m, median, depth)
     out = np.empty(np.shape(depth_m))
-    fit_planes(depth, inverse, weights, gate_m, out)
+    fit_planes(depth, inverse, reference, weights, gate_m, out)
     return out

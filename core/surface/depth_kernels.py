@@ -81,6 +81,7 @@ def fuse_frames(
 def fit_planes(
     depth: NDArray[np.float32],
     inverse: NDArray[np.float32],
+    reference: NDArray[np.float32],
     weights: NDArray[np.float32],
     gate_m: float,
     out: NDArray[np.float64],
@@ -106,7 +107,8 @@ def fit_planes(
         n = last - first + 1
         if n <= 0:
             continue
-        center = depth[y + radius, first + radius : first + radius + n]
+        center = reference[y + radius, first + radius : first + radius + n]
+        own = depth[y + radius, first + radius : first + radius + n]
         base = inverse[y + radius, first + radius : first + radius + n]
         sums = np.zeros((9, n), np.float32)
         part = np.zeros((5, n), np.float32)
@@ -142,7 +144,7 @@ def fit_planes(
                 sums[8, x] += dy * q0[x]
         for x in range(n):
             z0 = np.float64(center[x])
-            if z0 <= 0.0:
+            if own[x] <= 0.0:
                 continue
             s0, sx, sy = np.float64(sums[0, x]), np.float64(sums[1, x]), np.float64(sums[2, x])
             # A little weight on level planes keeps the fit defined where few neighbours are left.
@@ -156,8 +158,8 @@ def fit_planes(
                 s0 * c11 - sx * c12 + sy * c13
             )
             fitted = base[x] + shift
-            keep = fitted <= 0.0 or abs(1.0 / fitted - z0) >= gate_m
-            out[y, first + x] = z0 if keep else 1.0 / fitted
+            sound = fitted > 0.0 and abs(1.0 / fitted - z0) < gate_m
+            out[y, first + x] = 1.0 / fitted if sound else own[x]
 
 
 @njit(cache=True, nogil=True)

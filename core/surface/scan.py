@@ -85,7 +85,7 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
     smooth = denoise_depth(raw)
     progress(0.8, "Building the surface")
     surface = BodySurface.from_depth(smooth, camera)
-    noise = _noise(fused, raw, smooth)
+    noise = _noise(fused, raw)
     coverage = _coverage(mask.mask)
     warnings = list(mask.warnings)
     if coverage < 0.85:
@@ -96,14 +96,19 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
     return BodyScan(capture, fused, mask, surface, tuple(warnings), noise, coverage)
 
 
-def _noise(fused: FusedDepth, raw: FloatArray, smooth: FloatArray) -> float:
-    """Noise of a single measurement: from the frames, or with one frame from what smoothing took away."""
+def _noise(fused: FusedDepth, raw: FloatArray) -> float:
+    """Noise of a single measurement: from the frames, or with one frame from its second differences.
+
+    Second differences of a smooth surface are all noise, with six times its variance; larger ones are edges.
+    """
     on = raw > 0
     measured = fused.noise_m[on]
     measured = measured[np.isfinite(measured)]
     if len(measured):
         return float(np.median(measured))
-    return float(1.4826 * np.median(np.abs(raw[on] - smooth[on])))
+    bend = raw[:, 2:] - 2.0 * raw[:, 1:-1] + raw[:, :-2]
+    inner = on[:, 2:] & on[:, 1:-1] & on[:, :-2] & (np.abs(bend) < 0.1)
+    return float(np.sqrt(np.mean(bend[inner] ** 2) / 6.0)) if inner.any() else 0.0
 
 
 def _coverage(mask: NDArray[np.bool_]) -> float:

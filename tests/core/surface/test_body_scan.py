@@ -33,7 +33,7 @@ def test_noise_and_coverage_are_measured(scan: BodyScan) -> None:
 
 def test_the_noise_of_a_single_frame_is_estimated_too(make_scene: Any, make_person: Any) -> None:
     single = scan_body(make_scene(make_person()).capture(frames=1))
-    assert single.depth_noise_m == pytest.approx(0.0012 + 0.0019 * (2.4 - 0.4) ** 2, rel=0.5)
+    assert single.depth_noise_m == pytest.approx(0.0012 + 0.0019 * (2.4 - 0.4) ** 2, rel=0.25)
 
 
 def test_missing_depth_inside_the_body_is_told(make_scene: Any, make_person: Any) -> None:

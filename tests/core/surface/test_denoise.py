@@ -41,6 +41,19 @@ def test_geodesic_lengthening_drops_as_described() -> None:
     assert np.abs(denoise_depth(fused) - truth)[20:-20, columns].mean() < 0.0004
 
 
+def test_even_a_single_noisy_frame_gains() -> None:
+    """Noise of the size of the gate must not gate away the neighbours that would mend it."""
+    rng = np.random.default_rng(1)
+    truth = cylinder_depth(radius=0.3, distance=2.3)
+    noisy = np.where(truth > 0, truth + 0.009 * rng.standard_normal(truth.shape), 0)
+    columns = slice(130, 190)
+    true_length = row_lengths(truth, columns).mean()
+    assert row_lengths(noisy, columns).mean() / true_length - 1 > 1.0
+    assert row_lengths(denoise_depth(noisy), columns).mean() / true_length - 1 < 0.25
+    error = np.abs(denoise_depth(noisy) - truth)[20:-20, columns].mean()
+    assert error < 0.5 * np.abs(noisy - truth)[20:-20, columns].mean()
+
+
 def test_a_slanted_plane_is_left_as_it_is() -> None:
     normal = np.array([0.6, 0.3, -0.74])
     truth = -1.2 / (CAMERA.pixel_rays @ normal)
