@@ -6,7 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.surface.threads import in_chunks
+
 FloatArray = NDArray[np.float64]
+
+_ROWS = 32
 
 
 def denoise_depth(depth_m: FloatArray, *, sigma_px: float = 1.5, gate_m: float = 0.020) -> FloatArray:
@@ -33,5 +37,9 @@ def denoise_depth(depth_m: FloatArray, *, sigma_px: float = 1.5, gate_m: float =
     median = cv2.medianBlur(depth, 5)
     reference = np.where(np.abs(median - depth) < gate_m, median, depth)
     out = np.empty(np.shape(depth_m))
-    fit_planes(depth, inverse, reference, weights, gate_m, out)
+    in_chunks(
+        lambda first, last: fit_planes(depth, inverse, reference, weights, gate_m, out, first, last),
+        len(out),
+        _ROWS,
+    )
     return out

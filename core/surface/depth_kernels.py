@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True)
 def fuse_frames(
     frames: NDArray[np.uint16],
     gate: int,
     least: int,
     mean: NDArray[np.float64],
     spread: NDArray[np.float64],
+    first_row: int,
+    last_row: int,
 ) -> None:
     """Robust mean and standard deviation of each pixel over the frames, in raw units.
 
@@ -21,8 +23,8 @@ def fuse_frames(
     bisection on the value, a whole row at a time: every inner loop is free of branches and runs in vector
     instructions.
     """
-    n, height, width = frames.shape
-    for row in prange(height):
+    n, _, width = frames.shape
+    for row in range(first_row, last_row):
         low = np.full(width, 65535, np.uint16)
         high = np.zeros(width, np.uint16)
         zeros = np.zeros(width, np.uint16)
@@ -77,7 +79,7 @@ def fuse_frames(
             spread[row, x] = np.sqrt(variance) if good and c > 1 else np.nan
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True)
 def fit_planes(
     depth: NDArray[np.float32],
     inverse: NDArray[np.float32],
@@ -85,6 +87,8 @@ def fit_planes(
     weights: NDArray[np.float32],
     gate_m: float,
     out: NDArray[np.float64],
+    first_row: int,
+    last_row: int,
 ) -> None:
     """Value at each pixel of the plane fitted to the inverse depth around it.
 
@@ -94,11 +98,10 @@ def fit_planes(
     instructions.
     """
     radius = weights.shape[0] // 2
-    height, width = out.shape
+    width = out.shape[1]
     per_gate = np.float32(1.0 / gate_m)
     one, zero = np.float32(1.0), np.float32(0.0)
-    for row in prange(height):
-        y = np.int64(row)  # the parallel index is unsigned
+    for y in range(first_row, last_row):
         first, last = width, -1
         for x in range(width):
             out[y, x] = 0.0

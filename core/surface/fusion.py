@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import InputError
+from core.surface.threads import in_chunks
 
 FloatArray = NDArray[np.float64]
+
+_ROWS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,5 +56,7 @@ def fuse_depth(
     n, height, width = frames.shape
     mean, spread = np.empty((height, width)), np.empty((height, width))
     least = max(1, int(np.ceil(share * n)))
-    fuse_frames(np.ascontiguousarray(frames), max(1, round(gate_m / unit_m)), least, mean, spread)
+    frames = np.ascontiguousarray(frames)
+    gate = max(1, round(gate_m / unit_m))
+    in_chunks(lambda first, last: fuse_frames(frames, gate, least, mean, spread, first, last), height, _ROWS)
     return FusedDepth(mean * unit_m, spread * unit_m, n)

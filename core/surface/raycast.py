@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from core.surface.threads import in_chunks
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 _TILE = 4
-_CHUNK = 4096
-_THREADS = 4
+_CHUNK = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,12 @@ class GridTree:
         o = np.ascontiguousarray(np.asarray(origin, dtype=float).reshape(3))
         t, triangle = np.empty(len(d)), np.empty(len(d), np.int32)
         weights = np.empty((len(d), 3))
-        _in_chunks(lambda k: cast_rays(*self._mesh, o, d[k], t[k], triangle[k], weights[k]), len(d))
+
+        def work(first: int, last: int) -> None:
+            k = slice(first, last)
+            cast_rays(*self._mesh, o, d[k], t[k], triangle[k], weights[k])
+
+        in_chunks(work, len(d), _CHUNK)
         return RayHits(triangle >= 0, t, triangle, weights)
 
     def nearest(self, points: ArrayLike) -> tuple[IntArray, FloatArray]:
@@ -70,19 +74,14 @@ class GridTree:
 
         p = np.ascontiguousarray(np.asarray(points, dtype=float).reshape(-1, 3))
         triangle, weights = np.full(len(p), -1, np.int32), np.zeros((len(p), 3))
-        _in_chunks(lambda k: nearest_points(*self._mesh, p[k], triangle[k], weights[k]), len(p))
+
+        def work(first: int, last: int) -> None:
+            k = slice(first, last)
+            nearest_points(*self._mesh, p[k], triangle[k], weights[k])
+
+        in_chunks(work, len(p), _CHUNK)
         return triangle, weights
 
     @property
     def _mesh(self) -> tuple[NDArray[np.generic], ...]:
         return (self._vertices, self._triangles, *self._tree, self._dims, self._offsets)
-
-
-def _in_chunks(work: Callable[[slice], None], count: int) -> None:
-    """Do ``work`` on all of ``count`` items, many of them in several threads: the kernels hold no lock."""
-    if count <= _CHUNK:
-        work(slice(0, count))
-        return
-    with ThreadPoolExecutor(_THREADS) as pool:
-        for _ in pool.map(work, [slice(i, i + _CHUNK) for i in range(0, count, _CHUNK)]):
-            pass
