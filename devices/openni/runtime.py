@@ -51,7 +51,7 @@ def load_runtime() -> ModuleType:
         if not (found := sorted(folder.glob(_LIBRARY + "*"))):
             continue
         try:
-            openni2.initialize(str(_as_binding_wants(folder, found[0])))
+            _initialize(openni2, folder, found[0])
         except Exception as error:  # noqa: BLE001 - the binding raises its own and ctypes' kinds alike
             tried[-1] += f" ({str(error).splitlines()[0]})"
             continue
@@ -62,15 +62,18 @@ def load_runtime() -> ModuleType:
     )
 
 
-def _as_binding_wants(folder: Path, library: Path) -> Path:
-    """Folder with the plain library name the binding insists on.
+def _initialize(openni2: ModuleType, folder: Path, library: Path) -> None:
+    """Load the library by the plain name the binding insists on.
 
     Debian's runtime package has only ``libOpenNI2.so.0``; the plain name comes with the development package.
-    The runtime finds its drivers beside the library it was loaded from, so both are linked.
+    The runtime finds its drivers beside the library it was loaded from, so both are linked into a folder that
+    is needed only while they are loaded.
     """
     if library.name == _LIBRARY:
-        return folder
-    linked = Path(tempfile.mkdtemp(prefix="geoderm-openni2-"))
-    (linked / _LIBRARY).symlink_to(library)
-    (linked / "OpenNI2").symlink_to(folder / "OpenNI2")
-    return linked
+        openni2.initialize(str(folder))
+        return
+    with tempfile.TemporaryDirectory(prefix="geoderm-openni2-") as name:
+        linked = Path(name)
+        (linked / _LIBRARY).symlink_to(library)
+        (linked / "OpenNI2").symlink_to(folder / "OpenNI2")
+        openni2.initialize(str(linked))
