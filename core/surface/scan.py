@@ -59,6 +59,10 @@ class BodyScan:
         """The person's own skin colour; None without enough of it."""
         return measure_skin_tone(self.capture, self.vertex_picture_pixels)
 
+    def prepare_clicks(self) -> None:
+        """Compute what clicks need now, so that the first one is as fast as the others."""
+        _ = self.skin_tone, self.surface.tree
+
     @cached_property
     def head_m(self) -> FloatArray | None:
         """Roughly the centre of the head: recorded, or guessed by `guess_head`."""
@@ -92,8 +96,10 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
         warnings.append(
             f"Only {coverage:.0%} of the body's outline was measured; dark, shiny or steep parts are missing."
         )
+    scan = BodyScan(capture, fused, mask, surface, tuple(warnings), noise, coverage)
+    scan.prepare_clicks()
     progress(1.0, "Skin surface ready")
-    return BodyScan(capture, fused, mask, surface, tuple(warnings), noise, coverage)
+    return scan
 
 
 def _noise(fused: FusedDepth, raw: FloatArray) -> float:
