@@ -16,7 +16,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-SHARE_OF_EDGE = 0.25
+SHARE_OF_EDGE = 1.0
 """Width of a bucket, as a share of a short edge (tenth percentile)."""
 
 MOST_BUCKETS = 1 << 16

@@ -54,6 +54,7 @@ def fast_marching_front(  # type: ignore[no-untyped-def]
         remove(ring, link, a)
         queued -= 1
         da = d[a]
+        reach = da * da
         for k in range(start[a], start[a + np.uint32(1)]):
             for side in range(2):
                 t = corners[k, side]
@@ -62,12 +63,13 @@ def fast_marching_front(  # type: ignore[no-untyped-def]
                 lat = np.float64(shape[k, side])
                 lab = np.float64(shape[k, 1 - side])
                 lbt = np.float64(shape[k, 2])
-                early = da < near or lat * lat + lbt * lbt < lab * lab
-                if dt <= da and (not early or dt <= da - lat):
-                    continue
+                if dt <= da:  # due before the edge's end: see core.geodesics.virtual_source
+                    narrow = lat * lat + lbt * lbt - lab * lab
+                    if (dt * dt + lat * lat) * lbt - dt * narrow < reach * lbt:
+                        continue
                 candidate = da + lat
                 db = d[b]
-                if db < far and (early or link[b, 2] < 0):
+                if db < far and link[b, 2] < 0:
                     cx = lat * np.float64(shape[k, 3])
                     cy = lat * np.float64(shape[k, 4])
                     if da < near and db < near:

@@ -66,7 +66,8 @@ def geodesic_solver(
     method : str
         A key of `GEODESIC_METHODS`.
     pixels : array (n, 2), optional
-        Column and row of every vertex when the mesh is a depth grid; lets many sources be solved together.
+        Column and row of every vertex when the mesh is a depth grid: a hint for registered methods that use
+        the grid. The built-in ones need none.
 
     Raises
     ------

@@ -58,6 +58,7 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
         da = state[a, 0]
         sa = state[a, 1]
         inherited = da if bends[a] else sa
+        reach = (da - sa) * (da - sa)
         for k in range(start[a], start[a + np.uint32(1)]):
             for side in range(2):
                 t = corners[k, side]
@@ -66,17 +67,18 @@ def virtual_source_front(  # type: ignore[no-untyped-def]
                 lat = np.float64(shape[k, side])
                 lab = np.float64(shape[k, 1 - side])
                 lbt = np.float64(shape[k, 2])
-                # A target behind a wide corner, or close to the source, may be due before the edge's far end:
-                # when (t - source) and (t - b) make an angle of cosine less than |tb| / 2 |t - source|.
-                narrow = lat * lat + lbt * lbt - lab * lab
-                early = narrow < 0.0 or narrow * (da - sa - lat) <= lat * lbt * lbt
-                if dt <= da and (not early or dt <= da - lat):
-                    continue
+                if dt <= da:
+                    # The target was due before the edge's end: at wide corners, and close to the source. If
+                    # the straight way to t crosses ab, the law of cosines in (source, a, t) bounds da.
+                    rt = dt - sa
+                    narrow = lat * lat + lbt * lbt - lab * lab
+                    if (rt * rt + lat * lat) * lbt - rt * narrow < reach * lbt:
+                        continue
                 candidate = da + lat
                 origin = inherited
                 db = state[b, 0]
                 # While the edge's other end waits in the queue, its own turn will come for this triangle.
-                if db < far and (early or link[b, 2] < 0):
+                if db < far and link[b, 2] < 0:
                     cx = lat * np.float64(shape[k, 3])
                     cy = lat * np.float64(shape[k, 4])
                     sg = min(sa, state[b, 1])

@@ -11,8 +11,8 @@ from core.geodesics import GEODESIC_METHODS, geodesic_solver
 
 SIDE = 14
 METHODS = st.sampled_from(list(GEODESIC_METHODS))
-# Dijkstra is exact on its graph. The fronts approximate: on sheets as coarse as these, and ragged at the edge, they are
-# right to about 0.2 per cent on average but to a few per cent at worst.
+# Dijkstra is exact on its graph. The fronts approximate: on sheets as coarse as these, ragged at the
+# edge, they are right to about 0.2 per cent on average but to a few per cent at worst.
 SLACK = {"dijkstra": 1e-5, "fast-marching": 0.1, "virtual-source": 0.1}
 
 

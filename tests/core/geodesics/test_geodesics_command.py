@@ -54,5 +54,11 @@ def test_wrong_names_are_refused(run, tmp_path):
         run("--sources", "0", mesh=tmp_path / "none.off")
     with pytest.raises(InputError, match=r"\.npy"):
         run("--sources", "0", out=tmp_path / "d.txt")
-    with pytest.raises(WorkError, match="cannot be written"):
+    with pytest.raises(InputError, match="no folder"):
         run("--sources", "0", out=tmp_path / "no folder" / "d.npy")
+
+
+def test_a_result_that_cannot_be_written_is_told(run, tmp_path):
+    (tmp_path / "taken.npy").mkdir()
+    with pytest.raises(WorkError, match=r"taken\.npy"):
+        run("--sources", "0", out=tmp_path / "taken.npy")
