@@ -23,6 +23,8 @@ MEAN_RADIUS_M = 0.06
 FREEDOM = 3.0
 MAX_SQUARED = 200.0
 """Normalised squared residuals are cut here: a farther anchor says no more than "elsewhere"."""
+_PRODUCT = 16
+"""Logarithms are taken of products of so many terms: single precision holds them."""
 AMBIGUOUS_COST = 2.0
 """Two places whose costs differ by less explain the distances equally well."""
 
@@ -106,16 +108,34 @@ def cost_field(
     use = np.isfinite(lesion)
     scale = (1.0 / (sigma_m[use] * np.sqrt(FREEDOM))).astype(np.float32)
     limit = np.float32(np.sqrt(MAX_SQUARED / FREEDOM))
-    product = np.ones(distances.shape[1], np.float32)
+    total = np.zeros(distances.shape[1], np.float32)
     rows = np.flatnonzero(use)
-    for row, factor, target in zip(rows, scale, lesion[use].astype(np.float32), strict=True):
-        residual = np.minimum(np.abs(distances[row] - target) * factor, limit)
-        product *= np.float32(1.0) + residual * residual
-    return np.asarray(np.float32(4.0) * np.log(product), dtype=np.float32)
+    targets = lesion[use].astype(np.float32)
+    for start in range(0, len(rows), _PRODUCT):
+        product = np.ones(distances.shape[1], np.float32)
+        for k in range(start, min(start + _PRODUCT, len(rows))):
+            residual = np.minimum(np.abs(distances[rows[k]] - targets[k]) * scale[k], limit)
+            product *= np.float32(1.0) + residual * residual
+        total += np.log(product)
+    return np.asarray(np.float32(4.0) * total, dtype=np.float32)
+
+
+def neighbourhood_cost(vertices: FloatArray, place: FloatArray, sigma_m: float) -> NDArray[np.float32]:
+    """Cost (n,) of lying away from where the skeleton carries a lesion: one more, very blunt, robust ruler.
+
+    It decides between places that mirror each other and hardly moves an answer that is near.
+    """
+    square = ((vertices - place) ** 2).sum(axis=1) / (FREEDOM * sigma_m**2)
+    return np.asarray(4.0 * np.log1p(square), dtype=np.float32)
 
 
 def trilaterate(
-    field: SkinField, lesion: FloatArray, sigma_m: FloatArray, *, max_others: int = 3
+    field: SkinField,
+    lesion: FloatArray,
+    sigma_m: FloatArray,
+    *,
+    extra_cost: NDArray[np.float32] | None = None,
+    max_others: int = 3,
 ) -> Fix | None:
     """Place of one lesion from its distances to the anchors.
 
@@ -127,6 +147,8 @@ def trilaterate(
         Distances of the first visit; inf for an anchor that takes no part.
     sigma_m : ndarray (a,)
         Standard deviation of each residual.
+    extra_cost : ndarray (n,), optional
+        Cost from other knowledge, for example `neighbourhood_cost`.
 
     Returns
     -------
@@ -135,6 +157,8 @@ def trilaterate(
     """
     use = np.isfinite(lesion)
     cost = cost_field(field.distances, lesion, sigma_m)
+    if extra_cost is not None:
+        cost = cost + extra_cost
     reached = np.isfinite(field.distances[use]).any(axis=0)
     if not use.any() or not reached.any():
         return None

@@ -7,16 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from core.relocation.bones import Bone, bones, carry, nearest_bone
 from core.relocation.network import AnchorNetwork, build_network
 from core.relocation.pair import PickedLesion, VisitPair
 from core.relocation.posterior import confidence, radius95_m, skin_region
 from core.relocation.registry import MethodContext, MethodOutcome
 from core.relocation.rim import beyond_the_rim
 from core.relocation.signatures import LEAST_ANCHORS, LesionSignature, lesion_signatures
-from core.relocation.trilateration import trilaterate
+from core.relocation.trilateration import neighbourhood_cost, trilaterate
 from core.relocation.types import Candidate, Estimate
 
 FloatArray = NDArray[np.float64]
+
+
+NEIGHBOURHOOD_M = 0.10
+"""How well the skeleton alone knows a place: enough to tell the left arm from the right."""
 
 
 class TrilaterationMethod:
@@ -32,17 +37,24 @@ class TrilaterationMethod:
         context.progress(0.85, "Trilaterating")
         with context.clock.phase("trilateration"):
             signatures = lesion_signatures(network.first, lesions, network.sigma_m, network.stretch)
-            estimates = tuple(_estimate(pair, network, s) for s in signatures)
+            skeleton = bones(pair)
+            estimates = tuple(_estimate(pair, network, s, skeleton) for s in signatures)
         return MethodOutcome(estimates)
 
 
-def _estimate(pair: VisitPair, network: AnchorNetwork, signature: LesionSignature) -> Estimate:
+def _estimate(
+    pair: VisitPair, network: AnchorNetwork, signature: LesionSignature, skeleton: tuple[Bone, ...]
+) -> Estimate:
     if signature.reached < LEAST_ANCHORS:
         return Estimate(
             None,
             reason=f"Only {signature.reached} anchors reach the lesion; {LEAST_ANCHORS} are needed.",
         )
-    fix = trilaterate(network.field, signature.distances_m, signature.sigma_m)
+    expected = None
+    if skeleton:
+        place = carry(signature.position_m, nearest_bone(signature.position_m, skeleton))
+        expected = neighbourhood_cost(network.field.vertices, place, NEIGHBOURHOOD_M)
+    fix = trilaterate(network.field, signature.distances_m, signature.sigma_m, extra_cost=expected)
     if fix is None or fix.used < LEAST_ANCHORS:
         used = 0 if fix is None else fix.used
         return Estimate(
