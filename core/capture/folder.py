@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import tempfile
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
@@ -34,6 +35,8 @@ _MAX_JOINT_M = 15.0
 _MAX_JOINTS = 200
 # A pixel seen more than 80 degrees off the axis, or focal lengths beyond any lens: a unit or order mistake.
 _MAX_RAY = 6.0
+# A lens that draws the whole view together to less than this share of its width is no lens.
+_MIN_SPREAD = 0.2
 _FOCAL_RANGE = (0.05, 200.0)
 
 
@@ -176,9 +179,7 @@ def _read_camera(owner: Fields) -> PinholeCamera:
         raise fields.error("distortion", f"is wrong. {error.message}") from error
     if not _is_invertible(camera):
         name = "distortion" if any(distortion) else "fx"
-        raise fields.error(
-            name, "sends pixels of the image out of the field of view.", "Calibrate the camera again."
-        )
+        raise fields.error(name, "bends the image as no lens does.", "Calibrate the camera again.")
     return camera
 
 
@@ -187,7 +188,9 @@ def _is_invertible(camera: PinholeCamera) -> bool:
     u, v = np.meshgrid(np.linspace(0, camera.width - 1, 9), np.linspace(0, camera.height - 1, 9))
     pixels = np.stack([u.ravel(), v.ravel()], axis=1)
     rays = camera.rays(pixels)
-    if not np.isfinite(rays).all() or float(np.abs(rays).max()) > _MAX_RAY:
+    widest = float(np.abs(rays[:, :2]).max())
+    without_lens = float(np.abs(replace(camera, distortion=()).rays(pixels)[:, :2]).max())
+    if not np.isfinite(rays).all() or widest > _MAX_RAY or widest < _MIN_SPREAD * without_lens:
         return False
     back = camera.project(rays)
     return bool(np.isfinite(back).all() and np.abs(back - pixels).max() < 1.0)
