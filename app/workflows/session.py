@@ -11,7 +11,7 @@ from app.workflows.first_visit import FIRST_VISIT
 from app.workflows.follow_up import FOLLOW_UP
 from app.workflows.lesion_edits import LesionEdits
 from app.workflows.notifier import Notifier
-from app.workflows.search import SearchOutcome, run_plan
+from app.workflows.search import SearchOutcome, explanation_pictures, run_plan
 from app.workflows.snapshot import VisitSnapshot
 from app.workflows.table import Event, Refused, State, StateInfo, StateTable
 from app.workflows.wording import StatusText, describe
@@ -20,6 +20,9 @@ from core.progress import Progress, ScaledProgress, no_progress
 from core.records import AnatomicSite, AnchorRecord, CaptureRecord, DermoscopicImage, Lesion
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from core.anchors import AnalysedCapture, SkeletonCalibration
     from core.records import ClinicStore
 
@@ -273,6 +276,26 @@ class VisitSession:
         self._edits.set_replaced_aside()
         self.reload()
         self.fire(Event.LESIONS_RELOCATED)
+
+    def explain(self, lesion_id: int, progress: Progress = no_progress) -> dict[str, NDArray[np.uint8]]:
+        """Worker: pictures of how the proposed place of a lesion came about, by title."""
+        for search in self._snapshot.plan().searches:
+            place = next((p for p in search.places if p.lesion_id == lesion_id), None)
+            if place is not None:
+                proposal = self._snapshot.in_force(lesion_id)
+                return explanation_pictures(
+                    place,
+                    search,
+                    self.prepare,
+                    number=str(next(x.number for x in self._snapshot.lesions if x.id == lesion_id)),
+                    method=proposal.method if proposal is not None else "",
+                    answer_m=proposal.proposed_point_m if proposal is not None else None,
+                    progress=progress,
+                )
+        raise Refused(
+            "This lesion was not looked for in this visit, so there is nothing to explain.",
+            "Explanations exist for lesions of earlier visits.",
+        )
 
     # -- lesions -----------------------------------------------------------------------------------
 

@@ -62,9 +62,9 @@ class CameraDeck(QObject):
         return isinstance(self._camera, PosablePatient)
 
     @property
-    def is_recording(self) -> bool:
-        """Whether the camera plays something back that says itself which view it is."""
-        return self._camera is not None and not self._camera.info.live
+    def kind(self) -> str:
+        """Kind of the open camera; empty while there is none."""
+        return "" if self._camera is None else self._camera.info.kind
 
     def choices(self) -> list[DeviceInfo]:
         """Cameras that could be opened now."""

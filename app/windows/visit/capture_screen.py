@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSignalBlocker, Signal, Slot
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QIcon, QImage
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -23,7 +23,7 @@ from app.theme import icon, palette, set_state, style_class
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.camera_deck import CameraDeck
 from app.windows.visit.pictures import joints_picture, preview_picture
-from app.windows.visit.side_panel import BulletList, SidePanel, field_label, wrapped
+from app.windows.visit.side_panel import BulletList, SidePanel, field_label
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
@@ -60,11 +60,14 @@ class CaptureScreen(QWidget):
         The filled button, and the plain one beside it.
     pose_changed()
         Another view or simulated stance was chosen.
+    live_toggled()
+        The camera's picture, or the capture, is to be shown.
     """
 
     primary_clicked = Signal()
     secondary_clicked = Signal()
     pose_changed = Signal()
+    live_toggled = Signal()
 
     def __init__(self, name: str, deck: CameraDeck, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -76,10 +79,14 @@ class CaptureScreen(QWidget):
         self.caption = QLabel()
         self.caption.setObjectName(f"{name}_photo_caption")
         style_class(self.caption, "caption")
+        self.live_button = QPushButton(icon("camera", palette.SECONDARY), "Live picture")
+        self.live_button.setObjectName(f"{name}_live")
+        self.live_button.setCheckable(True)
+        style_class(self.live_button, "quiet")
+        self.live_button.toggled.connect(lambda _: self.live_toggled.emit())
         self.panel = SidePanel(name)
         self.corrections = BulletList(f"{name}_corrections", "warning")
         self.warnings = BulletList(f"{name}_warnings", "info")
-        self.summary = wrapped("", "", f"{name}_summary")
         self.secondary = self.panel.add_secondary("", f"{name}_secondary")
         self.secondary.clicked.connect(self.secondary_clicked)
         self.panel.primary.clicked.connect(self.primary_clicked)
@@ -133,7 +140,10 @@ class CaptureScreen(QWidget):
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(frame, 1)
-        left.addWidget(self.caption)
+        below = QHBoxLayout()
+        below.addWidget(self.caption, 1)
+        below.addWidget(self.live_button)
+        left.addLayout(below)
         body = self.panel.body
         body.addWidget(self.corrections)
         self.camera_label = field_label("Camera")
@@ -151,7 +161,6 @@ class CaptureScreen(QWidget):
         body.addSpacing(4)
         body.addWidget(self.stance_label)
         body.addWidget(self.stance_box)
-        body.addWidget(self.summary)
         body.addWidget(self.warnings)
         body.addStretch(1)
         row = QHBoxLayout(self)
@@ -162,15 +171,32 @@ class CaptureScreen(QWidget):
 
     # --- what is shown -------------------------------------------------------------------------------
 
-    def set_choices_visible(self, *, view: bool, stance: bool) -> None:
-        """Which of the choices this step offers."""
+    def set_choices_visible(self, *, view: bool) -> None:
+        """Whether this step asks which side of the body is in the picture."""
         for button in self.views.buttons():
             button.setVisible(view)
         self.view_label.setVisible(view)
-        self._stance_wanted = stance
-        self._on_camera()
 
-    _stance_wanted = True
+    def show_taken(self, views: tuple[str, ...]) -> None:
+        """Mark the sides that are captured already."""
+        for i, view in enumerate(VIEWS):
+            self.views.button(i).setIcon(icon("check", palette.GREEN) if view in views else QIcon())
+
+    def offer_live(self, on: bool) -> None:
+        """Whether the user may look through the camera although there is a capture to show."""
+        self.live_button.setVisible(on)
+        if not on:
+            self.stop_live()
+
+    def stop_live(self) -> None:
+        """Prefer the capture to the camera's picture again."""
+        with QSignalBlocker(self.live_button):
+            self.live_button.setChecked(False)
+
+    @property
+    def live_wanted(self) -> bool:
+        """Whether the user asked for the camera's picture."""
+        return self.live_button.isChecked()
 
     @property
     def view(self) -> str:
@@ -186,6 +212,11 @@ class CaptureScreen(QWidget):
     def stance(self) -> str:
         """The simulated patient's stance chosen."""
         return str(self.stance_box.currentData())
+
+    def set_stance(self, stance: str) -> None:
+        """Choose a simulated stance without telling."""
+        with QSignalBlocker(self.stance_box):
+            self.stance_box.setCurrentIndex(self.stance_box.findData(stance))
 
     def show_preview(self) -> None:
         """Show what the camera sees."""
@@ -240,7 +271,7 @@ class CaptureScreen(QWidget):
                 self.camera_box.addItem(_recording_name(deck.camera_id), deck.camera_id)
                 index = self.camera_box.count() - 1
             self.camera_box.setCurrentIndex(index)
-        simulated = deck.is_simulator and self._stance_wanted
+        simulated = deck.is_simulator
         self.stance_label.setVisible(simulated)
         self.stance_box.setVisible(simulated)
         if self._live:

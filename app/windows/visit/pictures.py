@@ -14,9 +14,11 @@ from app.widgets.images import to_qimage
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
+    from core.records import CaptureRecord, ClinicStore
     from devices.camera import PreviewFrame
 
 _NEAR_M, _FAR_M = 0.6, 4.0
+_USUAL_UNIT_M = 0.001
 
 
 def depth_picture(depth_m: NDArray[np.float32] | NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -42,6 +44,14 @@ def capture_picture(analysed: AnalysedCapture) -> NDArray[np.uint8]:
 
     scan = analysed.scan
     return shade_depth(scan.fused.depth_m, scan.mask.mask, analysed.capture.rig.depth)
+
+
+def stored_picture(store: ClinicStore, record: CaptureRecord) -> QImage:
+    """The picture of a stored capture without analysing it: the photo, else the first depth frame."""
+    photo = store.captures.color_picture(record.id)
+    if photo is not None:
+        return to_qimage(photo)
+    return to_qimage(depth_picture(store.captures.depth_picture(record.id) * _USUAL_UNIT_M))
 
 
 def joints_picture(analysed: AnalysedCapture) -> QImage:

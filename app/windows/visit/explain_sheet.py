@@ -1,0 +1,54 @@
+"""How a proposed place came about: bands, votes, the biggest cluster and the geodesic paths as pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from app.theme import style_class
+from app.widgets.photo_view import PhotoView
+from app.widgets.sheet import Sheet
+from app.windows.visit.lesion_screen import segment
+from app.windows.visit.side_panel import wrapped
+
+_TEXT = (
+    "The place is found from distances along the skin to the joints: each joint marks a band of skin at the "
+    "distance measured at the previous visit, and the lesion lies where the bands meet."
+)
+
+
+def show_explanation(parent: QWidget, number: int, pictures: Mapping[str, NDArray[np.uint8]]) -> Sheet:
+    """Open the sheet with one tab per picture; ``pictures`` maps a tab's title to RGB."""
+    content = QWidget()
+    stack = QStackedWidget()
+    tabs = QHBoxLayout()
+    tabs.setSpacing(0)
+    group = QButtonGroup(content)
+    for i, (title, picture) in enumerate(pictures.items()):
+        button = segment(title, f"explain_tab_{i}", first=i == 0, last=i == len(pictures) - 1)
+        button.setChecked(i == 0)
+        group.addButton(button, i)
+        tabs.addWidget(button)
+        view = PhotoView()
+        view.setObjectName(f"explain_picture_{i}")
+        view.set_image(picture)
+        stack.addWidget(view)
+    tabs.addStretch(1)
+    group.idClicked.connect(stack.setCurrentIndex)
+    frame = QFrame()
+    style_class(frame, "photo")
+    inside = QVBoxLayout(frame)
+    inside.setContentsMargins(1, 1, 1, 1)
+    inside.addWidget(stack)
+    column = QVBoxLayout(content)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(12)
+    column.addLayout(tabs)
+    column.addWidget(frame, 1)
+    sheet = Sheet(parent, f"Lesion {number}: how the place was found", "explain_sheet", width=None)
+    sheet.body.addWidget(wrapped(_TEXT, "secondary", "explain_sheet_text"))
+    sheet.body.addWidget(content, 1)
+    return sheet.open()

@@ -1,0 +1,334 @@
+"""Step 3: lesions on the photo, on the 3D body and in the table; one selection for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+from PySide6.QtCore import QSignalBlocker, Signal, Slot
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.theme import icon, palette, set_state, style_class
+from app.widgets.body_view import BodyLesion, BodyView, surface_colors
+from app.widgets.markers import Marker
+from app.widgets.photo_view import PhotoView
+from app.windows.visit.lesion_details import LesionDetails
+from app.windows.visit.lesion_list import LesionLine, LesionList
+from app.windows.visit.side_panel import SidePanel
+
+if TYPE_CHECKING:
+    from core.anchors import AnalysedCapture
+
+PANES = (("photo", "Photo"), ("body", "Photo and 3D body"), ("compare", "Previous visit"))
+
+
+class LesionScreen(QWidget):
+    """Shows what it is told; every act is a signal.
+
+    Signals
+    -------
+    selected(str)
+        A lesion was clicked in any view.
+    placed(float, float)
+        The photo or the body was clicked where there is no lesion, in picture pixels, while placing.
+    moved(str, float, float)
+        A marker was dragged.
+    delete_requested(str)
+    capture_chosen(int)
+        Another side of the body is to be shown.
+    confirm_all(), accept_unseen(), mark_new(bool), primary_clicked()
+    pane_changed(str)
+    """
+
+    selected = Signal(str)
+    placed = Signal(float, float)
+    moved = Signal(str, float, float)
+    delete_requested = Signal(str)
+    capture_chosen = Signal(int)
+    confirm_all = Signal()
+    accept_unseen = Signal()
+    mark_new = Signal(bool)
+    primary_clicked = Signal()
+    pane_changed = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("lesion_screen")
+        self._analysed: AnalysedCapture | None = None
+        self._body_shown: AnalysedCapture | None = None
+        self.photo = PhotoView()
+        self.photo.setObjectName("lesion_photo")
+        self.body = BodyView()
+        self.body.setObjectName("lesion_body")
+        self.previous = PhotoView()
+        self.previous.setObjectName("previous_photo")
+        self.list = LesionList("lesion_list")
+        self.details = LesionDetails()
+        self.panel = SidePanel("lesions")
+        self.panel.primary.clicked.connect(self.primary_clicked)
+        self.count = QLabel()
+        self.count.setObjectName("lesion_count")
+        style_class(self.count, "caption")
+        self.progress = QProgressBar()
+        self.progress.setObjectName("lesion_progress")
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(6)
+        self.confirm_all_button = QPushButton(icon("check", palette.SECONDARY), "Confirm all confident")
+        self.confirm_all_button.setObjectName("confirm_all")
+        self.unseen_button = QPushButton(icon("eye-off", palette.SECONDARY), "Agree: not in view")
+        self.unseen_button.setObjectName("accept_unseen")
+        self.new_button = QPushButton(icon("plus", palette.SECONDARY), "Mark new lesion")
+        self.new_button.setObjectName("mark_new_lesion")
+        self.new_button.setCheckable(True)
+        self.hint = QLabel("Click a lesion in the list or on the photo to see its details.")
+        self.hint.setObjectName("lesion_hint")
+        self.hint.setWordWrap(True)
+        style_class(self.hint, "caption")
+        self._captures = QButtonGroup(self)
+        self._capture_row = QHBoxLayout()
+        self._capture_row.setSpacing(0)
+        self._panes = QButtonGroup(self)
+        self._build()
+        self._connect()
+        self.set_pane("photo")
+        self.show_details(False)
+
+    # --- building ------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        tools = QHBoxLayout()
+        tools.setSpacing(8)
+        tools.addLayout(self._capture_row)
+        tools.addWidget(self.new_button)
+        tools.addStretch(1)
+        for name, symbol, tip, act in (
+            ("photo_fit", "fit", "Show the whole photo (0)", self.photo.fit),
+            ("photo_zoom_in", "zoom-in", "Zoom in (+)", lambda: self.photo.zoom_by(1.5)),
+            ("photo_zoom_out", "zoom-out", "Zoom out (-)", lambda: self.photo.zoom_by(1 / 1.5)),
+        ):
+            button = QToolButton()
+            button.setObjectName(name)
+            button.setIcon(icon(symbol, palette.SECONDARY))
+            button.setToolTip(tip)
+            style_class(button, "icon")
+            button.clicked.connect(lambda _=False, a=act: a())
+            tools.addWidget(button)
+        segments = QHBoxLayout()
+        segments.setSpacing(0)
+        for i, (key, text) in enumerate(PANES):
+            button = segment(text, f"pane_{key}", first=i == 0, last=i == len(PANES) - 1)
+            self._panes.addButton(button, i)
+            segments.addWidget(button)
+        tools.addSpacing(8)
+        tools.addLayout(segments)
+        self._photo_frame, self.photo_caption = _framed(self.photo, "lesion_photo_caption")
+        self._body_frame, self.body_caption = _framed(self.body, "lesion_body_caption", dark=False)
+        self._previous_frame, self.previous_caption = _framed(self.previous, "previous_photo_caption")
+        pictures = QHBoxLayout()
+        pictures.setSpacing(16)
+        pictures.addWidget(self._previous_frame, 1)
+        pictures.addWidget(self._photo_frame, 1)
+        pictures.addWidget(self._body_frame, 1)
+        left = QVBoxLayout()
+        left.setSpacing(8)
+        left.addLayout(tools)
+        left.addLayout(pictures, 1)
+        bulk = QHBoxLayout()
+        bulk.setSpacing(8)
+        bulk.addWidget(self.confirm_all_button, 1)
+        bulk.addWidget(self.unseen_button, 1)
+        body = self.panel.body
+        body.setSpacing(8)
+        body.addWidget(self.progress)
+        body.addWidget(self.count)
+        body.addWidget(self.list, 1)
+        body.addLayout(bulk)
+        body.addWidget(self.hint)
+        body.addWidget(self.details)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(24, 16, 24, 24)
+        row.setSpacing(16)
+        row.addLayout(left, 1)
+        row.addWidget(self.panel)
+
+    def _connect(self) -> None:
+        self.photo.marker_clicked.connect(self._on_clicked)
+        self.photo.placed.connect(self.placed)
+        self.photo.marker_moved.connect(self.moved)
+        self.photo.delete_requested.connect(self.delete_requested)
+        self.previous.marker_clicked.connect(self._on_clicked)
+        self.body.lesion_clicked.connect(self._on_clicked)
+        self.body.placed.connect(self._on_body_placed)
+        self.list.lesion_clicked.connect(self._on_list_clicked)
+        self.list.lesion_activated.connect(self.center_on)
+        self.confirm_all_button.clicked.connect(self.confirm_all)
+        self.unseen_button.clicked.connect(self.accept_unseen)
+        self.new_button.toggled.connect(self.mark_new)
+        self._panes.idClicked.connect(lambda i: self.set_pane(PANES[i][0]))
+        self._captures.idClicked.connect(self.capture_chosen)
+
+    # --- panes ---------------------------------------------------------------------------------------
+
+    @property
+    def pane(self) -> str:
+        """Which pictures are shown: photo, body or compare."""
+        return PANES[max(self._panes.checkedId(), 0)][0]
+
+    def set_pane(self, pane: str) -> None:
+        """Show the photo alone, with the body, or with the previous visit's photo."""
+        index = [key for key, _ in PANES].index(pane)
+        self._panes.button(index).setChecked(True)
+        self._previous_frame.setVisible(pane == "compare")
+        self._body_frame.setVisible(pane == "body")
+        self._show_body()
+        self.pane_changed.emit(pane)
+
+    def set_compare_available(self, on: bool) -> None:
+        """Whether there is a previous visit to show."""
+        self._panes.button(2).setVisible(on)
+        last = self._panes.button(2 if on else 1)
+        for i in range(3):
+            set_state(self._panes.button(i), "last", "true" if self._panes.button(i) is last else "false")
+
+    # --- contents ------------------------------------------------------------------------------------
+
+    def set_captures(self, views: Mapping[str, int], shown: int | None) -> None:
+        """Offer the captures of this visit; with one alone there is nothing to choose."""
+        for button in self._captures.buttons():
+            self._captures.removeButton(button)
+            self._capture_row.removeWidget(button)
+            button.deleteLater()
+        if len(views) < 2:
+            return
+        for i, (view, capture_id) in enumerate(views.items()):
+            button = segment(view.capitalize(), f"capture_{view}", first=i == 0, last=i == len(views) - 1)
+            button.setChecked(capture_id == shown)
+            self._captures.addButton(button, capture_id)
+            self._capture_row.addWidget(button)
+
+    def show_capture(
+        self, picture: NDArray | QImage | None, analysed: AnalysedCapture | None, caption: str
+    ) -> None:
+        """Show the picture of a capture of this visit; the body as soon as it is analysed."""
+        self.photo.set_image(picture)
+        self.photo_caption.setText(caption)
+        self._analysed = analysed
+        self._show_body()
+
+    def _show_body(self) -> None:
+        if self.pane != "body" or self._analysed is self._body_shown:
+            return
+        self._body_shown = self._analysed
+        if self._analysed is None:
+            self.body.clear()
+            return
+        surface = self._analysed.scan.surface
+        self.body.set_surface(
+            surface.vertices, surface.triangles, surface_colors(self._analysed.capture, surface.vertices)
+        )
+
+    def show_previous(self, markers: Sequence[Marker], caption: str) -> None:
+        """Show the lesions on the photo of the previous visit."""
+        self.previous.set_markers(markers)
+        self.previous_caption.setText(caption)
+
+    def show_lesions(
+        self,
+        lines: Sequence[LesionLine],
+        markers: Sequence[Marker],
+        on_body: Sequence[BodyLesion],
+        selected: str | None,
+    ) -> None:
+        """Show the lesions in the table, on the photo and on the body."""
+        self.list.set_lines(lines)
+        self.photo.set_markers(markers)
+        self.body.set_lesions(list(on_body))
+        self.show_selected(selected)
+
+    def show_selected(self, lesion_id: str | None) -> None:
+        """Select a lesion in every view."""
+        self.list.set_selected(lesion_id)
+        self.photo.set_selected(lesion_id)
+        self.body.set_selected(lesion_id)
+        self.previous.set_selected(lesion_id)
+
+    def show_details(self, on: bool) -> None:
+        """Whether a lesion is selected whose details are shown."""
+        self.details.setVisible(on)
+        self.hint.setVisible(not on)
+
+    def show_placing(self, on: bool, *, new: bool) -> None:
+        """Whether a click places a lesion, and whether a new one."""
+        self.photo.set_placing(on)
+        self.body.set_placing(on)
+        with QSignalBlocker(self.new_button):
+            self.new_button.setChecked(new)
+
+    def center_on(self, lesion_id: str, zoom: float = 4.0) -> None:
+        """Bring a lesion to the middle of the photo and in front on the body."""
+        self.photo.center_on_marker(lesion_id, zoom)
+        self.previous.center_on_marker(lesion_id, zoom)
+        if self.pane == "body":
+            self.body.turn_to(lesion_id)
+
+    @Slot(str)
+    def _on_clicked(self, lesion_id: str) -> None:
+        self.selected.emit(lesion_id)
+
+    @Slot(str)
+    def _on_list_clicked(self, lesion_id: str) -> None:
+        self.selected.emit(lesion_id)
+        marker = next((m for m in self.photo.markers() if m.id == lesion_id), None)
+        if marker is not None and not self.photo.viewport().rect().contains(
+            self.photo.viewport_position(marker.x, marker.y)
+        ):
+            self.photo.center_on(marker.x, marker.y)
+        if self.pane == "body":
+            self.body.turn_to(lesion_id)
+
+    @Slot(float, float, float)
+    def _on_body_placed(self, x: float, y: float, z: float) -> None:
+        if self._analysed is not None:
+            u, v = self._analysed.capture.rig.project_to_picture([[x, y, z]])[0]
+            self.placed.emit(float(u), float(v))
+
+
+def segment(text: str, name: str, *, first: bool, last: bool) -> QPushButton:
+    """One button of a row of which one is chosen."""
+    button = QPushButton(text)
+    button.setObjectName(name)
+    button.setCheckable(True)
+    style_class(button, "segment")
+    set_state(button, "first", "true" if first else "false")
+    set_state(button, "last", "true" if last else "false")
+    return button
+
+
+def _framed(view: QWidget, caption_name: str, *, dark: bool = True) -> tuple[QWidget, QLabel]:
+    holder = QWidget()
+    frame = QFrame()
+    style_class(frame, "photo" if dark else "card")
+    inside = QVBoxLayout(frame)
+    inside.setContentsMargins(1, 1, 1, 1 if dark else 8)
+    inside.addWidget(view)
+    caption = QLabel()
+    caption.setObjectName(caption_name)
+    style_class(caption, "caption")
+    column = QVBoxLayout(holder)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(4)
+    column.addWidget(frame, 1)
+    column.addWidget(caption)
+    return holder, caption
