@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _DATA = typer.Option(None, "--data", help="Clinic folder. Default: the application's own.")
 _USER = typer.Option(None, "--user", help="Sign the change as this user. Default: the only user there is.")
 _JSON = typer.Option(False, "--json", help="Print JSON.")
+_LARGEST = 2**63 - 1
+_PATIENT = typer.Argument(..., min=1, max=_LARGEST, help="Record number of the patient.")
 
 
 def register(app: typer.Typer) -> None:
@@ -122,7 +124,7 @@ def add_patient(
         typer.echo(store.patients.create(draft, by=_acting_user(store, user).id).id)
 
 
-def visits(patient: int, data: Path | None = _DATA, as_json: bool = _JSON) -> None:
+def visits(patient: int = _PATIENT, data: Path | None = _DATA, as_json: bool = _JSON) -> None:
     """List the visits of a patient and their captures."""
     with _store(data) as store:
         store.patients.get(patient)
@@ -140,7 +142,7 @@ def visits(patient: int, data: Path | None = _DATA, as_json: bool = _JSON) -> No
     _print(rows, as_json)
 
 
-def lesions(patient: int, data: Path | None = _DATA, as_json: bool = _JSON) -> None:
+def lesions(patient: int = _PATIENT, data: Path | None = _DATA, as_json: bool = _JSON) -> None:
     """List the lesions of a patient with the last decision on each."""
     with _store(data) as store:
         store.patients.get(patient)
@@ -163,13 +165,15 @@ def lesions(patient: int, data: Path | None = _DATA, as_json: bool = _JSON) -> N
 
 
 def report(
-    visit: int = typer.Argument(..., help="Record number of the visit (geoderm records visits PATIENT)."),
+    visit: int = typer.Argument(
+        ..., min=1, max=_LARGEST, help="Record number of the visit (geoderm records visits PATIENT)."
+    ),
     out: Path = typer.Option(..., "--out", help="PDF to write."),
     data: Path | None = _DATA,
     user: str | None = _USER,
 ) -> None:
     """Write the report of a visit as PDF."""
-    from core.exchange import write_visit_report
+    from core.exchange.report import write_visit_report
 
     with _store(data) as store:
         store.visits.get(visit)
@@ -178,7 +182,7 @@ def report(
 
 
 def export_capture(
-    capture: int = typer.Argument(..., help="Record number of the capture."),
+    capture: int = typer.Argument(..., min=1, max=_LARGEST, help="Record number of the capture."),
     out: Path = typer.Option(..., "--out", help="Capture folder to write."),
     data: Path | None = _DATA,
 ) -> None:
