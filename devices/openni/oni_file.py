@@ -7,6 +7,7 @@ loss or as JPEG.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -101,7 +102,8 @@ def write_oni_frames(
             _Writer(stream, nodes, mirrored).write(depth_frames, color_frames)
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
         raise WorkError(
             f"{path}: the recording could not be written ({error.strerror}).",
             "Check the folder's free space and permissions.",
