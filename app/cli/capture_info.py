@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from app.cli.stored_pixels import entry_as_stored, mirrored_captures
+
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
 
@@ -29,7 +31,11 @@ def capture_info(
     capture = read_capture(folder)
     analysed = analyse_capture(capture, default_tracker())
     if as_json:
-        typer.echo(json.dumps(capture_report(analysed), indent=1))
+        report = capture_report(analysed)
+        if mirrored_captures(folder, [folder.name]):
+            for joint in report["joints"].values():
+                entry_as_stored(joint, capture.rig)
+        typer.echo(json.dumps(report, indent=1))
     else:
         typer.echo(_table(folder, analysed))
 

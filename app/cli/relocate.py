@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from app.cli.stored_pixels import entry_as_stored, mirrored_captures, query_as_read
 from core.errors import InputError, WorkError
 
 if TYPE_CHECKING:
@@ -55,6 +56,9 @@ def relocate_command(
         raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
     first_visit, followup_visit = read_visit(first), read_visit(followup)
     _check_pixels(lesions, queries, dict(first_visit))
+    first_mirrored = mirrored_captures(first, dict(first_visit))
+    followup_mirrored = mirrored_captures(followup, dict(followup_visit))
+    queries = tuple(query_as_read(query, dict(first_visit), first_mirrored) for query in queries)
     read = time.perf_counter()
     wanted = {q.capture for q in queries if q.capture is not None} or {name for name, _ in first_visit}
     analysed1, _ = _analyse([(n, c) for n, c in first_visit if n in wanted] if queries else [])
@@ -70,6 +74,9 @@ def relocate_command(
         options=options,
     )
     document = result.to_json()
+    for entry in document["lesions"] if isinstance(document["lesions"], list) else []:
+        if entry.get("capture") in followup_mirrored:
+            entry_as_stored(entry, analysed2[entry["capture"]].capture.rig)
     if len(first_visit) == 1 and len(followup_visit) == 1 and not any(q.capture for q in queries):
         for entry in document["lesions"] if isinstance(document["lesions"], list) else []:
             entry.pop("capture", None)
