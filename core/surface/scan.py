@@ -111,7 +111,8 @@ def _noise(fused: FusedDepth, raw: FloatArray) -> float:
     measured = fused.noise_m[on]
     measured = measured[np.isfinite(measured)]
     if len(measured):
-        return float(np.median(measured))
+        # A few frames of coarsely stepped depth are equal at most pixels; the others then tell the noise.
+        return float(np.median(measured) or np.sqrt(np.mean(measured**2)))
     bend = raw[:, 2:] - 2.0 * raw[:, 1:-1] + raw[:, :-2]
     inner = on[:, 2:] & on[:, 1:-1] & on[:, :-2] & (np.abs(bend) < 0.1)
     return float(np.sqrt(np.mean(bend[inner] ** 2) / 6.0)) if inner.any() else 0.0
