@@ -31,8 +31,7 @@ STATES = {
     S.CHECK: StateInfo(
         2,
         "Check the lesions",
-        "Compare each proposed place with the previous visit: confirm it, drag it to the right place, or say "
-        "that it is not in view. Click an unmarked mole to add a new lesion.",
+        "Confirm each proposed place, drag it to the right one, or say that it is not in view.",
         "Continue to review",
     ),
     **END_STATES,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,6 +58,7 @@ def run_plan(
     analyse: Analyse,
     *,
     some_capture_id: int,
+    numbers: Mapping[int, int],
     method: str | None = None,
     progress: Progress = no_progress,
 ) -> SearchOutcome:
@@ -71,6 +72,8 @@ def run_plan(
         Capture id and progress to `AnalysedCapture`.
     some_capture_id : int
         A capture in force, which carries the note that a lesion's side was not captured.
+    numbers : mapping of int to int
+        Lesion id to the number by which the doctor knows it, for warnings.
     method : str or None
         Relocation method; None for the default.
     progress : Progress
@@ -87,11 +90,14 @@ def run_plan(
         result = relocate(
             first,
             followup,
-            [LesionQuery(str(p.lesion_id), pixel=p.pixel) for p in search.places],
+            [LesionQuery(str(numbers[p.lesion_id]), pixel=p.pixel) for p in search.places],
             method=method or DEFAULT_METHOD,
             progress=ScaledProgress(share, 0.6, 1.0),
         )
-        drafts += [_draft(lesion, visit_id, search, result) for lesion in result.lesions]
+        drafts += [
+            _draft(place.lesion_id, result[str(numbers[place.lesion_id])], visit_id, search, result)
+            for place in search.places
+        ]
         warnings += result.warnings
         seconds += float(result.seconds.get("total", 0.0))
     drafts += [_unseen(o, visit_id, some_capture_id) for o in plan.out_of_view]
@@ -99,10 +105,10 @@ def run_plan(
 
 
 def _draft(
-    lesion: RelocatedLesion, visit_id: int, search: Search, result: RelocationResult
+    lesion_id: int, lesion: RelocatedLesion, visit_id: int, search: Search, result: RelocationResult
 ) -> ObservationDraft:
     return ObservationDraft(
-        lesion_id=int(lesion.id),
+        lesion_id=lesion_id,
         visit_id=visit_id,
         capture_id=search.target_capture_id,
         status=lesion.status,

@@ -266,6 +266,7 @@ class VisitSession:
             self.visit_id,
             self.prepare,
             some_capture_id=max(views.values()),
+            numbers={lesion.id: lesion.number for lesion in self._snapshot.lesions},
             method=self.method,
             progress=progress,
         )

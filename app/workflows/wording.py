@@ -96,7 +96,7 @@ def _proposal(o: Observation) -> StatusText:
         )
     return StatusText(
         f"Proposed, {radius}: please check",
-        f"{o.reason} The lesion is within {radius.lstrip('±')} of the marker in 95 of 100 cases.".strip(),
+        f"{o.reason} Expect it within {radius.lstrip('±')} (95 %).".strip(),
         "uncertain",
         True,
     )

@@ -79,7 +79,7 @@ class CaptureScreen(QWidget):
         self.caption = QLabel()
         self.caption.setObjectName(f"{name}_photo_caption")
         style_class(self.caption, "caption")
-        self.live_button = QPushButton(icon("camera", palette.SECONDARY), "Live picture")
+        self.live_button = QPushButton(icon("camera", palette.SECONDARY), " Live picture")
         self.live_button.setObjectName(f"{name}_live")
         self.live_button.setCheckable(True)
         style_class(self.live_button, "quiet")
@@ -126,7 +126,7 @@ class CaptureScreen(QWidget):
         self.stance_label = field_label("Stance of the simulated patient")
 
     def _tool(self, text: str, symbol: str, name: str, act: object) -> QPushButton:
-        button = QPushButton(icon(symbol, palette.SECONDARY), text)
+        button = QPushButton(icon(symbol, palette.SECONDARY), f" {text}")
         button.setObjectName(f"{self._name}_{name}")
         button.clicked.connect(act)
         return button

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Signal, Slot
+from PySide6.QtCore import QSize, QTimer, Signal, Slot
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from app.theme import icon, palette, style_class
@@ -47,6 +47,13 @@ class _Images(QWidget):
         row.setSpacing(16)
         for image in images:
             row.addLayout(self._column(image), 1)
+        QTimer.singleShot(0, self._tie)
+
+    @Slot()
+    def _tie(self) -> None:
+        """Once laid out: both fitted, then moved and zoomed together."""
+        for view in self._views:
+            view.fit()
         if len(self._views) == 2:
             a, b = self._views
             a.view_changed.connect(lambda: b.set_view_state(a.view_state()))
@@ -66,10 +73,11 @@ class _Images(QWidget):
         inside.addWidget(view)
         caption = QLabel(f"Visit {visits[image.visit_id].number}, {when(image.added_at)}")
         style_class(caption, "strong")
+        caption.setMinimumHeight(42)
         below = QHBoxLayout()
         below.addWidget(caption, 1)
         if image.visit_id == session.visit_id and session.snapshot.visit.is_open:
-            remove = QPushButton(icon("trash", palette.SECONDARY), "Remove image")
+            remove = QPushButton(icon("trash", palette.SECONDARY), " Remove image")
             remove.setObjectName("remove_dermoscopy")
             remove.setIconSize(QSize(18, 18))
             remove.clicked.connect(lambda _=False, i=image.id: self._remove(i))

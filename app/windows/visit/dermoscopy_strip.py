@@ -10,9 +10,9 @@ from PySide6.QtCore import QSize, Qt, Signal, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QIcon, QPixmap
 from PySide6.QtWidgets import QFileDialog, QFrame, QHBoxLayout, QLabel, QPushButton, QToolButton, QWidget
 
-from app.theme import icon, palette, set_state, style_class
+from app.theme import icon, palette, style_class
 
-_SIDE = 64
+_SIDE = 52
 IMAGE_FILTER = "Images (*.jpg *.jpeg *.png *.tif *.tiff);;All files (*)"
 
 
@@ -55,24 +55,25 @@ class DermoscopyStrip(QFrame):
         style_class(self, "panel")
         self.setAcceptDrops(True)
         self._row = QHBoxLayout(self)
-        self._row.setContentsMargins(8, 8, 8, 8)
+        self._row.setContentsMargins(6, 6, 6, 6)
         self._row.setSpacing(8)
         self._thumbs: list[QToolButton] = []
         self._empty = QLabel("Drop a dermoscopic image here")
         style_class(self._empty, "caption")
         self._empty.setWordWrap(True)
-        self.attach = QPushButton(icon("dermoscopy", palette.SECONDARY), "Attach")
+        self.attach = QPushButton(icon("dermoscopy", palette.SECONDARY), " Attach")
         self.attach.setObjectName("attach_dermoscopy")
         self.attach.setToolTip("Attach dermoscopic images from files")
         self.attach.clicked.connect(self._ask)
         self._row.addWidget(self._empty, 1)
         self._row.addWidget(self.attach, 0, Qt.AlignmentFlag.AlignVCenter)
-        self.setFixedHeight(_SIDE + 18)
+        self.setFixedHeight(_SIDE + 14)
 
     def set_thumbnails(self, thumbnails: Sequence[Thumbnail]) -> None:
         """Show these images (the newest four), first visit first."""
         for button in self._thumbs:
             self._row.removeWidget(button)
+            button.hide()
             button.deleteLater()
         self._thumbs = []
         for position, thumb in enumerate(list(thumbnails)[-4:]):
@@ -91,10 +92,14 @@ class DermoscopyStrip(QFrame):
                 )
             )
             button.setIconSize(QSize(_SIDE - 6, _SIDE - 6))
-            button.setFixedSize(_SIDE, _SIDE)
-            button.setToolTip(thumb.caption)
-            style_class(button, "icon")
-            set_state(button, "current", "true" if thumb.current else "false")
+            line = palette.ACCENT if thumb.current else palette.BORDER_STRONG
+            button.setStyleSheet(
+                f"QToolButton {{ padding: 0; border: 2px solid {line}; border-radius: 6px;"
+                f" min-width: {_SIDE - 4}px; max-width: {_SIDE - 4}px;"
+                f" min-height: {_SIDE - 4}px; max-height: {_SIDE - 4}px; }}"
+                f"QToolButton:hover, QToolButton:focus {{ border-color: {palette.ACCENT_HOVER}; }}"
+            )
+            button.setToolTip(f"{thumb.caption}. Click to look at it closely.")
             button.clicked.connect(lambda _=False, i=thumb.image_id: self.image_clicked.emit(i))
             self._row.insertWidget(position, button)
             self._thumbs.append(button)

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.theme import icon, palette, style_class
 from app.windows.visit.dermoscopy_strip import DermoscopyStrip
-from app.windows.visit.side_panel import field_label, wrapped
+from app.windows.visit.side_panel import wrapped
 from app.windows.visit.site_choice import SiteChoice
 from app.workflows.wording import StatusText
 from core.records import Lesion, Observation
@@ -85,8 +85,10 @@ class LesionDetails(QFrame):
         self.size.setDecimals(1)
         self.size.setSingleStep(0.5)
         self.size.setSuffix(" mm")
-        self.size.setSpecialValueText("not measured")
+        self.size.setSpecialValueText("Size")
         self.size.setKeyboardTracking(False)
+        self.size.lineEdit().setTextMargins(10, 0, 0, 0)
+        self.size.setToolTip("Largest diameter in this visit")
         self.size.editingFinished.connect(self._send_size)
         self.size.valueChanged.connect(lambda _: self._send_size())
         self.note = QLineEdit()
@@ -101,7 +103,7 @@ class LesionDetails(QFrame):
         self._build()
 
     def _button(self, text: str, symbol: str, name: str, signal: object) -> QPushButton:
-        button = QPushButton(icon(symbol, palette.SECONDARY), text)
+        button = QPushButton(icon(symbol, palette.SECONDARY), f" {text}")
         button.setObjectName(name)
         if signal is not None:
             button.clicked.connect(lambda _=False: signal.emit())
@@ -116,27 +118,24 @@ class LesionDetails(QFrame):
         decide.setSpacing(8)
         for button in (self.confirm_button, self.unseen_button, self.place_button, self.undo_button):
             decide.addWidget(button, 1)
+        decide.addWidget(self.explain_button)
         measures = QHBoxLayout()
         measures.setSpacing(8)
-        self.size.setFixedWidth(136)
+        self.size.setFixedWidth(120)
         measures.addWidget(self.size)
         measures.addWidget(self.note, 1)
         last = QHBoxLayout()
         last.addWidget(self.removed)
         last.addStretch(1)
-        last.addWidget(self.explain_button)
         last.addWidget(self.delete_button)
         column = QVBoxLayout(self)
-        column.setContentsMargins(16, 12, 16, 8)
-        column.setSpacing(8)
+        column.setContentsMargins(12, 8, 12, 8)
+        column.setSpacing(6)
         column.addLayout(head)
         column.addWidget(self.reason)
         column.addLayout(decide)
-        column.addWidget(field_label("Anatomic site"))
         column.addWidget(self.site)
-        column.addWidget(field_label("Size and note"))
         column.addLayout(measures)
-        column.addWidget(field_label("Dermoscopic images"))
         column.addWidget(self.strip)
         column.addLayout(last)
 
@@ -158,7 +157,7 @@ class LesionDetails(QFrame):
         waiting = observation is not None and decision == "proposed"
         has_place = observation is not None and observation.pixel is not None and decision != "rejected"
         self.confirm_button.setVisible(waiting)
-        self.confirm_button.setText("Confirm" if has_place else "Agree")
+        self.confirm_button.setText(" Confirm" if has_place else " Agree")
         self.unseen_button.setVisible(waiting and has_place)
         self.place_button.setVisible(observation is not None and not has_place)
         if not self.place_button.isVisibleTo(self):

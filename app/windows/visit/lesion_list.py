@@ -58,20 +58,29 @@ class LesionList(QTableWidget):
         self.setObjectName(name)
         self.setHorizontalHeaderLabels(["No.", "Site", "Status"])
         self.verticalHeader().hide()
-        self.verticalHeader().setDefaultSectionSize(38)
+        self.verticalHeader().setDefaultSectionSize(36)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setShowGrid(False)
         self.setWordWrap(False)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setStyleSheet(
+            f"QTableView, QTableView:focus {{ background: {palette.CARD}; }}"
+            f"QTableView::item {{ padding: 0 6px; }} QHeaderView::section {{ padding: 0 6px; }}"
+        )
+        self.setMinimumHeight(112)
         self.setItemDelegateForColumn(2, _StatusDelegate(self))
         header = self.horizontalHeader()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(2, QHeaderView.ResizeMode.Fixed)
+        header.setHighlightSections(False)
+        header.setMinimumSectionSize(40)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        self.setColumnWidth(0, 48)
-        self.setColumnWidth(2, 232)
+        self.setColumnWidth(0, 44)
+        self.setColumnWidth(2, 262)
         self._quiet = False
         self.itemSelectionChanged.connect(self._on_selection)
         self.itemActivated.connect(lambda item: self.lesion_activated.emit(str(item.data(_ID))))
@@ -82,7 +91,7 @@ class LesionList(QTableWidget):
         self._quiet = True
         self.setRowCount(len(lines))
         for row, line in enumerate(lines):
-            texts = (str(line.number), line.site or "Site not given", line.status)
+            texts = (str(line.number), line.site or "no site yet", line.status)
             for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
                 item.setData(_ID, line.id)
@@ -90,10 +99,6 @@ class LesionList(QTableWidget):
                 item.setToolTip(line.detail or text)
                 if column == 1 and not line.site:
                     item.setForeground(QColor(palette.FAINT))
-                if column == 2 and line.needs_doctor:
-                    font = item.font()
-                    font.setWeight(font.Weight.DemiBold)
-                    item.setFont(font)
                 self.setItem(row, column, item)
         self._quiet = False
         self.set_selected(selected)

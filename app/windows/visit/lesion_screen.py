@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QSignalBlocker, Signal, Slot
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QTimer, Signal, Slot
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -30,6 +31,9 @@ from app.windows.visit.side_panel import SidePanel
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
+
+_BODY_MARGIN = 1.12
+_CLOSE = 4.0
 
 PANES = (("photo", "Photo"), ("body", "Photo and 3D body"), ("compare", "Previous visit"))
 
@@ -67,6 +71,8 @@ class LesionScreen(QWidget):
         super().__init__(parent)
         self.setObjectName("lesion_screen")
         self._analysed: AnalysedCapture | None = None
+        self._framed = False
+        self._framing = False
         self._body_shown: AnalysedCapture | None = None
         self.photo = PhotoView()
         self.photo.setObjectName("lesion_photo")
@@ -85,11 +91,11 @@ class LesionScreen(QWidget):
         self.progress.setObjectName("lesion_progress")
         self.progress.setTextVisible(False)
         self.progress.setFixedHeight(6)
-        self.confirm_all_button = QPushButton(icon("check", palette.SECONDARY), "Confirm all confident")
+        self.confirm_all_button = QPushButton(icon("check", palette.SECONDARY), " Confirm all confident")
         self.confirm_all_button.setObjectName("confirm_all")
-        self.unseen_button = QPushButton(icon("eye-off", palette.SECONDARY), "Agree: not in view")
+        self.unseen_button = QPushButton(icon("eye-off", palette.SECONDARY), " Agree: not in view")
         self.unseen_button.setObjectName("accept_unseen")
-        self.new_button = QPushButton(icon("plus", palette.SECONDARY), "Mark new lesion")
+        self.new_button = QPushButton(icon("plus", palette.SECONDARY), " Mark new lesion")
         self.new_button.setObjectName("mark_new_lesion")
         self.new_button.setCheckable(True)
         self.hint = QLabel("Click a lesion in the list or on the photo to see its details.")
@@ -164,11 +170,13 @@ class LesionScreen(QWidget):
         row.addWidget(self.panel)
 
     def _connect(self) -> None:
-        self.photo.marker_clicked.connect(self._on_clicked)
+        self.photo.viewport().installEventFilter(self)
+        self.photo.view_changed.connect(self._on_view_changed)
+        self.photo.marker_clicked.connect(self._on_photo_clicked)
         self.photo.placed.connect(self.placed)
         self.photo.marker_moved.connect(self.moved)
         self.photo.delete_requested.connect(self.delete_requested)
-        self.previous.marker_clicked.connect(self._on_clicked)
+        self.previous.marker_clicked.connect(self._on_previous_clicked)
         self.body.lesion_clicked.connect(self._on_clicked)
         self.body.placed.connect(self._on_body_placed)
         self.list.lesion_clicked.connect(self._on_list_clicked)
@@ -193,6 +201,7 @@ class LesionScreen(QWidget):
         self._previous_frame.setVisible(pane == "compare")
         self._body_frame.setVisible(pane == "body")
         self._show_body()
+        QTimer.singleShot(0, self, self.frame_body)
         self.pane_changed.emit(pane)
 
     def set_compare_available(self, on: bool) -> None:
@@ -226,6 +235,7 @@ class LesionScreen(QWidget):
         self.photo_caption.setText(caption)
         self._analysed = analysed
         self._show_body()
+        QTimer.singleShot(0, self, self.frame_body)
 
     def _show_body(self) -> None:
         if self.pane != "body" or self._analysed is self._body_shown:
@@ -238,6 +248,24 @@ class LesionScreen(QWidget):
         self.body.set_surface(
             surface.vertices, surface.triangles, surface_colors(self._analysed.capture, surface.vertices)
         )
+
+    def frame_body(self) -> None:
+        """Fill the photo's view with the body instead of the whole room."""
+        if self._analysed is None:
+            self.photo.fit()
+            return
+        self._framing = True
+        pixels = self._analysed.scan.vertex_picture_pixels
+        low, high = np.nanmin(pixels, axis=0), np.nanmax(pixels, axis=0)
+        width, height = self.photo.image_size
+        view = self.photo.viewport().size()
+        fitted = min(view.width() / max(width, 1), view.height() / max(height, 1))
+        span = np.maximum((high - low) * _BODY_MARGIN, 1.0)
+        wanted = min(view.width() / span[0], view.height() / span[1])
+        middle = (low + high) / 2
+        self.photo.center_on(float(middle[0]), float(middle[1]), max(wanted / fitted, 1.0))
+        self._framing = False
+        self._framed = True
 
     def show_previous(self, markers: Sequence[Marker], caption: str) -> None:
         """Show the lesions on the photo of the previous visit."""
@@ -276,7 +304,7 @@ class LesionScreen(QWidget):
         with QSignalBlocker(self.new_button):
             self.new_button.setChecked(new)
 
-    def center_on(self, lesion_id: str, zoom: float = 4.0) -> None:
+    def center_on(self, lesion_id: str, zoom: float = _CLOSE) -> None:
         """Bring a lesion to the middle of the photo and in front on the body."""
         self.photo.center_on_marker(lesion_id, zoom)
         self.previous.center_on_marker(lesion_id, zoom)
@@ -288,8 +316,32 @@ class LesionScreen(QWidget):
         self.selected.emit(lesion_id)
 
     @Slot(str)
+    def _on_photo_clicked(self, lesion_id: str) -> None:
+        self.selected.emit(lesion_id)
+        if self.pane == "compare":
+            self.previous.center_on_marker(lesion_id, _CLOSE)
+
+    @Slot(str)
+    def _on_previous_clicked(self, lesion_id: str) -> None:
+        self.selected.emit(lesion_id)
+        self.photo.center_on_marker(lesion_id, _CLOSE)
+
+    @Slot()
+    def _on_view_changed(self) -> None:
+        if not self._framing:
+            self._framed = False
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102
+        if event.type() == QEvent.Type.Resize and self._framed:
+            QTimer.singleShot(0, self, self.frame_body)
+        return super().eventFilter(watched, event)
+
+    @Slot(str)
     def _on_list_clicked(self, lesion_id: str) -> None:
         self.selected.emit(lesion_id)
+        if self.pane == "compare":
+            self.center_on(lesion_id)
+            return
         marker = next((m for m in self.photo.markers() if m.id == lesion_id), None)
         if marker is not None and not self.photo.viewport().rect().contains(
             self.photo.viewport_position(marker.x, marker.y)

@@ -79,6 +79,9 @@ class LesionStep(QObject):
             self.screen.set_compare_available(self._session.is_follow_up)
             if self._session.is_follow_up:
                 self.screen.set_pane("body")
+            if self._selected is None:
+                waiting = (x.id for x in self._session.snapshot.shown_lesions())
+                self._selected = next((i for i in waiting if self._session.status(i).needs_doctor), None)
             self.prepare()
         if self._capture_id not in views.values():
             self._capture_id = next(iter(views.values()), None)
@@ -132,13 +135,13 @@ class LesionStep(QObject):
         screen.confirm_all_button.setVisible(follow_up)
         screen.confirm_all_button.setEnabled(confident > 0)
         screen.confirm_all_button.setText(
-            f"Confirm all confident ({confident})" if confident else "Confirm all confident"
+            f" Confirm all confident ({confident})" if confident else " Confirm all confident"
         )
         screen.confirm_all_button.setToolTip(
             "Confirms every place known to within 20 mm." if confident else "No place is certain enough."
         )
         screen.unseen_button.setVisible(follow_up and unseen > 0)
-        screen.unseen_button.setText(f"Agree: not in view ({unseen})")
+        screen.unseen_button.setText(f" Agree: not in view ({unseen})")
         screen.new_button.setVisible(session.state is State.CHECK)
         screen.progress.setVisible(follow_up)
         screen.progress.setRange(0, max(facts.lesions, 1))

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLay
 from app.theme import style_class
 from app.workflows.table import StateInfo
 
-PANEL_WIDTH = 464
+PANEL_WIDTH = 488
 
 
 class SidePanel(QFrame):
@@ -37,12 +37,13 @@ class SidePanel(QFrame):
         self.primary.setObjectName(f"{name}_primary")
         style_class(self.primary, "primary")
         column = QVBoxLayout(self)
-        column.setContentsMargins(24, 20, 24, 20)
-        column.setSpacing(8)
+        column.setContentsMargins(24, 16, 24, 16)
+        column.setSpacing(6)
         column.addWidget(self.title)
         column.addWidget(self.instruction)
-        column.addSpacing(8)
+        column.addSpacing(6)
         column.addLayout(self.body, 1)
+        column.addSpacing(6)
         column.addLayout(self.buttons)
         self.buttons.addStretch(1)
         self.buttons.addWidget(self.primary)

@@ -30,8 +30,7 @@ class SiteChoice(QWidget):
         self._by_name: dict[str, AnatomicSite] = {}
         self.edit = QLineEdit()
         self.edit.setObjectName("site_search")
-        self.edit.setPlaceholderText("Search, for example forearm")
-        self.edit.setClearButtonEnabled(True)
+        self.edit.setPlaceholderText("Anatomic site: type to search")
         self.side = QComboBox()
         self.side.setObjectName("site_side")
         for key, text in _SIDES:
