@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
 from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
-from PySide6.QtCore import QObject, QRunnable, Qt, QThreadPool, Signal, Slot
+from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from app.tasks.failures import LOGGER, TaskFailure, describe_failure
 from core.errors import Cancelled
@@ -117,15 +118,6 @@ class Task(QObject):
         self.ended.emit()
 
 
-class _Job(QRunnable):
-    def __init__(self, task: Task, work: Callable[[Progress], Any]) -> None:
-        super().__init__()
-        self._task, self._work = task, work
-
-    def run(self) -> None:
-        self._task.run(self._work)
-
-
 class TaskRunner(QObject):
     """Runs tasks one after another in one worker thread.
 
@@ -142,9 +134,12 @@ class TaskRunner(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._pool = QThreadPool(self)
-        self._pool.setMaxThreadCount(1)
-        self._pool.setExpiryTimeout(-1)
+        # A plain thread that lives as long as the runner, not a QThreadPool: PySide gives every QRunnable a new
+        # Python thread state on the same system thread, and extensions that keep the first one (pybind11:
+        # Open3D, MediaPipe) then wait for themselves with the interpreter locked.
+        self._queue: queue.SimpleQueue[tuple[Task, Callable[[Progress], Any]] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name="geoderm-tasks", daemon=True)
+        self._thread.start()
         self._tasks: list[Task] = []
 
     @property
@@ -180,14 +175,21 @@ class TaskRunner(QObject):
         self._tasks.append(task)
         if len(self._tasks) == 1:
             self.busy_changed.emit(True)
-        self._pool.start(_Job(task, work))
+        self._queue.put((task, work))
         return task
+
+    def _work(self) -> None:
+        while (job := self._queue.get()) is not None:
+            task, work = job
+            task.run(work)
 
     def shut_down(self, timeout_s: float = 10.0) -> bool:
         """Cancel everything and wait for the worker; True if it ended in time."""
         for task in self._tasks:
             task.cancel()
-        ended = self._pool.waitForDone(int(timeout_s * 1000))
+        self._queue.put(None)
+        self._thread.join(timeout_s)
+        ended = not self._thread.is_alive()
         if not ended:
             LOGGER.error("A task did not end within %.0f s of closing.", timeout_s)
         return ended
