@@ -112,8 +112,8 @@ def explain_lesion(
     fields1 = FIELDS.fields(first.scan.surface, anchor_points(first, names), kind)
     fields2 = FIELDS.fields(followup.scan.surface, anchor_points(followup, names), kind)
     lesion = PickedLesion(query, pick.point, pick.normal)
-    at_vertices = kind != "virtual-source"
-    signature = lesion_signatures(fields1, [lesion], pair.sigma_m(names), 0.0, at_vertices=at_vertices)[0]
+    pixels = None if kind == "virtual-source" else first.scan.surface
+    signature = lesion_signatures(fields1, [lesion], pair.sigma_m(names), 0.0, at_pixels_of=pixels)[0]
     surface = followup.scan.surface
     edges = (
         grid_edges(surface.vertex_of_pixel, surface.vertices)

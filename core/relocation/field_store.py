@@ -52,11 +52,27 @@ class FieldStore:
             known = self._fields.setdefault(surface, {})
             if key in known:
                 return known[key]
-        built = geodesic_fields(surface, anchors, solver=self.solver(surface, kind))
+        built = _solve(surface, anchors, self.solver(surface, kind), kind)
         with self._lock:
             while len(known) >= 4:
                 known.pop(next(iter(known)))
             return known.setdefault(key, built)
+
+
+def nearest_corner(surface: BodySurface, point: SurfacePoint) -> int:
+    """The vertex (depth pixel) of a point's triangle that is nearest to it."""
+    return int(surface.triangles[point.triangle][int(np.argmax(point.barycentric))])
+
+
+def _solve(
+    surface: BodySurface, anchors: Mapping[str, SurfacePoint], solver: GeodesicSolver, kind: GeodesicKind
+) -> GeodesicFields:
+    """Fields of anchors; the thesis's two start at depth pixels, whose numbers every mesh shares."""
+    if kind == "virtual-source":
+        return geodesic_fields(surface, anchors, solver=solver)
+    sources = [nearest_corner(surface, point) for point in anchors.values()]
+    distances = solver.distances(sources)
+    return GeodesicFields(tuple(anchors), distances, solver.vertices, solver.triangles, solver.method)
 
 
 def _build(surface: BodySurface, kind: GeodesicKind) -> GeodesicSolver:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.geodesics import GeodesicFields
+from core.relocation.field_store import nearest_corner
 from core.relocation.pair import PickedLesion
+from core.surface import BodySurface
 
 FloatArray = NDArray[np.float64]
 
@@ -52,7 +54,7 @@ def lesion_signatures(
     anchor_sigma_m: FloatArray,
     stretch: float,
     *,
-    at_vertices: bool = False,
+    at_pixels_of: BodySurface | None = None,
 ) -> tuple[LesionSignature, ...]:
     """Signatures of lesions on the surface of the fields.
 
@@ -64,14 +66,13 @@ def lesion_signatures(
         What each anchor adds to the spread.
     stretch : float
         Share of a distance that a change of stance may add or take (METHOD section 3).
-    at_vertices : bool
-        Read the nearest depth pixel (the thesis) instead of the point between vertices.
+    at_pixels_of : BodySurface, optional
+        Read the nearest depth pixel of this surface (the thesis) instead of the point between vertices.
     """
     if not lesions:
         return ()
-    if at_vertices:
-        corners = [fields.triangles[p.point.triangle][int(np.argmax(p.point.barycentric))] for p in lesions]
-        distances = fields.distances[:, np.array(corners)]
+    if at_pixels_of is not None:
+        distances = fields.distances[:, [nearest_corner(at_pixels_of, p.point) for p in lesions]]
     else:
         distances = fields.at([p.point for p in lesions])
     return tuple(
