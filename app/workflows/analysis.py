@@ -89,10 +89,10 @@ def take(
 
 
 def camera_id_of_path(path: Path) -> str:
-    """Camera id of a recording on disk: a folder is a capture folder, everything else an .oni recording."""
-    if path.name == "capture.json":
-        path = path.parent
-    return f"folder:{path}" if path.is_dir() else f"recording:{path}"
+    """Camera id of a recording on disk: an .oni file, else a capture folder (or the capture.json in it)."""
+    if path.suffix.lower() == ".oni":
+        return f"recording:{path}"
+    return f"folder:{path.parent if path.name == 'capture.json' else path}"
 
 
 def analyse_new(

@@ -27,6 +27,7 @@ MAX_IMAGE_BYTES = 200_000_000
 _ADVICE = {
     "not on the body": "Click on the patient's skin.",
     "outside": "Click inside the photo.",
+    "depth camera": "Capture the body again with this skin facing both cameras.",
     "hair": "Part the hair and take the capture again, or mark the lesion beside the hair.",
 }
 

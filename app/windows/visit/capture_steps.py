@@ -179,7 +179,9 @@ class CaptureSteps(QObject):
 
     @Slot(object)
     def _on_camera_failed(self, failure: TaskFailure) -> None:
-        self._host.banner.show_failure(failure)
+        self._host.banner.show_error(
+            failure.message, failure.advice or "Choose another camera, capture folder or recording."
+        )
 
     # --- capturing -----------------------------------------------------------------------------------
 

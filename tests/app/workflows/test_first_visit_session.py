@@ -14,7 +14,7 @@ from core.records.sites import find_site
 from tests.app.workflows.conftest import Clinic, Take, capture_body, capture_stance, seen_lesions
 
 
-def cancel_at(fraction: float):  # noqa: ANN201 - a Progress
+def cancel_at(fraction: float):
     def progress(done: float, message: str = "") -> None:
         if done >= fraction:
             raise Cancelled
@@ -134,7 +134,7 @@ def test_a_click_beside_the_body_or_on_hair_is_refused_in_words_and_stores_nothi
     session.fire(Event.GO_LESIONS)
     capture_id = session.snapshot.views["front"]
     with pytest.raises(Refused, match="not on the body") as refusal:
-        session.mark(capture_id, (4.0, 4.0))
+        session.mark(capture_id, (120.0, 200.0))
     assert "Click on the patient's skin" in refusal.value.advice
     with pytest.raises(Refused, match="outside"):
         session.mark(capture_id, (-40.0, 4.0))
@@ -152,7 +152,7 @@ def test_a_click_beside_the_body_or_on_hair_is_refused_in_words_and_stores_nothi
     assert clinic.store.lesions.list(clinic.patient.id) == []
 
 
-def test_a_file_that_is_no_image_is_not_attached_and_named(clinic: Clinic, take: Take, tmp_path: Path) -> None:
+def test_a_file_that_is_no_image_is_not_attached(clinic: Clinic, take: Take, tmp_path: Path) -> None:
     session = clinic.session()
     capture_stance(session, take("psi", 1))
     capture_body(session, take("A", 1))

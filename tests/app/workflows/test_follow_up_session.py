@@ -85,7 +85,7 @@ def test_the_next_visit_starts_from_the_corrected_place(clinic: Clinic, take: Ta
     capture_stance(session, take("psi", 2))
     capture_body(session, take("A", 2))
     session.adopt_search(session.find_lesions())
-    (name, lesion_id), = marked.items()
+    ((name, lesion_id),) = marked.items()
     where = seen_lesions(take("A", 2), 20)[name]
     session.move(lesion_id, session.snapshot.views["front"], where)
     session.fire(Event.GO_REVIEW)
