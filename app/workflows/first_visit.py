@@ -55,7 +55,7 @@ ROWS = [
     Row(S.REVIEW, E.CLOSE, S.CLOSED, (Fact.HAS_CAPTURE, Fact.ALL_DECIDED), otherwise=DECIDE_FIRST),
 ]
 
-REFUSALS = {
+REFUSALS: dict[tuple[S | None, E], Refusal] = {
     (None, E.GO_LESIONS): Refusal(TAKE_STANCE, "Lesions are marked on the body capture."),
     (None, E.GO_REVIEW): Refusal("There is nothing to review yet.", TAKE_CAPTURE),
     (None, E.LESIONS_RELOCATED): Refusal(

@@ -58,7 +58,7 @@ ROWS = [
     ),
 ]
 
-REFUSALS = {
+REFUSALS: dict[tuple[S | None, E], Refusal] = {
     (None, E.GO_LESIONS): Refusal(TAKE_STANCE, "Lesions are found on the body capture."),
     (None, E.GO_REVIEW): Refusal("There is nothing to review yet.", TAKE_CAPTURE),
     (None, E.LESIONS_RELOCATED): Refusal(

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 Pixel = tuple[float, float]
 
+SIDES = ("front", "back", "left", "right")
+"""Views that name a side of the body; every other view is free text."""
+
 
 @dataclass(frozen=True)
 class KnownPlace:
@@ -75,6 +78,20 @@ def newest_of_each_view(captures: Iterable[tuple[int, str]]) -> dict[str, int]:
     return {view: capture_id for capture_id, view in captures}
 
 
+def matching_capture(view: str, current: Mapping[str, int]) -> int | None:
+    """The capture that may show a lesion seen in ``view``: of the same view, else of one that names no side.
+
+    A view of free text ("turned a little") says nothing about the side, so the search itself has to find out
+    whether the captures overlap; two different sides of the body do not.
+    """
+    if view in current:
+        return current[view]
+    free = [capture_id for name, capture_id in current.items() if name not in SIDES]
+    if free:
+        return max(free)
+    return max(current.values(), default=None) if view not in SIDES else None
+
+
 def plan_relocation(places: Sequence[KnownPlace], current: Mapping[str, int]) -> RelocationPlan:
     """Decide where each lesion is looked for.
 
@@ -92,13 +109,13 @@ def plan_relocation(places: Sequence[KnownPlace], current: Mapping[str, int]) ->
         grouped by (reference, target) capture so that each pair of surfaces is prepared once.
     """
     newest: dict[int, KnownPlace] = {}
-    for place in sorted(places, key=lambda p: (p.view in current, p.visit_number, p.capture_id)):
+    for place in sorted(places, key=lambda p: _rank(p, current)):
         newest[place.lesion_id] = place
     groups: dict[tuple[int, int], list[KnownPlace]] = {}
     unseen: list[OutOfView] = []
     for lesion_id in sorted(newest):
         place = newest[lesion_id]
-        target = current.get(place.view)
+        target = matching_capture(place.view, current)
         if target is None:
             unseen.append(OutOfView(lesion_id, place))
         else:
@@ -108,6 +125,12 @@ def plan_relocation(places: Sequence[KnownPlace], current: Mapping[str, int]) ->
         for (reference, target), group in sorted(groups.items())
     )
     return RelocationPlan(searches, tuple(unseen))
+
+
+def _rank(place: KnownPlace, current: Mapping[str, int]) -> tuple[bool, bool, int, int]:
+    """Better references last: in a captured view, newer."""
+    match = matching_capture(place.view, current) is not None
+    return match, place.view in current, place.visit_number, place.capture_id
 
 
 def pending(plan: RelocationPlan, looked_for: Mapping[int, Set[int]]) -> RelocationPlan:

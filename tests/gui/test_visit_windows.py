@@ -317,23 +317,6 @@ def test_a_follow_up_by_mouse(open_page: Open, world: World) -> None:
     assert hands.state is State.CLOSED
 
 
-def test_an_explanation_and_a_selection_from_every_view(open_page: Open, world: World) -> None:
-    hands = open_page(follow_up=True)
-    capture_both(hands, world, "A2")
-    hands.click("capture_primary")
-    screen = hands.page.lesions.screen
-    other = screen.list.ids()[1]
-    hands.page.lesions.screen.body.lesion_clicked.emit(other)
-    assert screen.list.selected() == other
-    assert screen.photo.selected() == other
-    hands.click("explain_lesion")
-    sheet = hands.page.window().findChild(QWidget, "explain_sheet")
-    assert sheet is not None
-    assert sheet.isVisible()
-    assert len(sheet.findChildren(PhotoView)) == 5
-    sheet.close_sheet()
-
-
 @pytest.mark.parametrize(
     ("folder", "word"),
     [
@@ -419,16 +402,55 @@ def test_an_empty_visit_is_not_kept_and_a_discarded_one_is_gone(open_page: Open,
     assert hands.context.store.visits.list(patient_id) == []
 
 
-def test_no_text_is_cut_and_one_filled_button_is_shown(open_page: Open, world: World) -> None:
+def test_the_lesion_step_has_one_filled_button_no_cut_text_one_selection_and_an_explanation(
+    open_page: Open, world: World
+) -> None:
     hands = open_page(follow_up=True)
     capture_both(hands, world, "A2")
     for step in ("capture_primary", "lesions_primary"):
-        filled = [
-            w for w in hands.page.findChildren(QWidget) if w.property("class") == "primary" and w.isVisible()
-        ]
-        assert [w.objectName() for w in filled] == [step]
-        hands.click(step)
+        shown = [w for w in hands.page.findChildren(QWidget) if w.isVisible()]
+        assert [w.objectName() for w in shown if w.property("class") == "primary"] == [step]
+        if step == "capture_primary":
+            hands.click(step)
     assert hands.page.minimumSizeHint().height() <= 900
     for label in hands.page.findChildren(QLabel):
         if label.isVisible() and label.text() and not label.wordWrap():
             assert label.width() >= label.sizeHint().width() - 1, label.text()
+
+    screen = hands.page.lesions.screen
+    other = screen.list.ids()[1]
+    screen.body.lesion_clicked.emit(other)
+    assert screen.list.selected() == other
+    assert screen.photo.selected() == other
+    hands.click("explain_lesion")
+    sheet = hands.page.window().findChild(QWidget, "explain_sheet")
+    assert sheet is not None
+    assert sheet.isVisible()
+    assert len(sheet.findChildren(PhotoView)) == 5
+    sheet.close_sheet()
+
+
+def test_the_demonstration_looks_through_the_simulated_camera_at_once(
+    world: World, tmp_path: Path, qapp: QApplication, qtbot: QtBot
+) -> None:
+    apply_theme(qapp)
+    shutil.copytree(world.root / "clinic", tmp_path / "clinic")
+    store = ClinicStore.open(tmp_path / "clinic")
+    context = AppContext(store, store.folder, tracker_factory=default_tracker, demonstration=True)
+    user = store.users.authenticate("weber", "a long password 1")
+    assert user is not None
+    context.log_in(user)
+    page = VisitPage(context, store.patients.search("Nováková")[0].patient.id)
+    page.resize(1440, 900)
+    page.show()
+    screen = page.captures.stance
+    qtbot.waitUntil(lambda: screen.photo.image_size != (0, 0), timeout=60_000)
+    assert screen.stance_box.isVisible()
+    assert screen.stance_box.currentData() == "psi"
+    assert screen.panel.primary.isEnabled()
+    page.leave()
+    page.close()
+    page.deleteLater()
+    context.tasks.shut_down()
+    QApplication.processEvents()
+    store.close()

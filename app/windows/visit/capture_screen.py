@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -125,7 +126,7 @@ class CaptureScreen(QWidget):
         self.stance_box.currentIndexChanged.connect(lambda _: self.pose_changed.emit())
         self.stance_label = field_label("Stance of the simulated patient")
 
-    def _tool(self, text: str, symbol: str, name: str, act: object) -> QPushButton:
+    def _tool(self, text: str, symbol: str, name: str, act: Callable[[], None]) -> QPushButton:
         button = QPushButton(icon(symbol, palette.SECONDARY), f" {text}")
         button.setObjectName(f"{self._name}_{name}")
         button.clicked.connect(act)

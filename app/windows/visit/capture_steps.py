@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Slot
@@ -12,6 +13,7 @@ from app.windows.visit.capture_screen import CaptureScreen
 from app.windows.visit.host import VisitHost
 from app.windows.visit.pictures import stored_picture
 from app.workflows.analysis import NewCapture, take
+from app.workflows.search import SearchOutcome
 from app.workflows.table import Event, State
 from app.workflows.wording import when
 from core.progress import Progress, ScaledProgress
@@ -138,7 +140,7 @@ class CaptureSteps(QObject):
 
         self._show_once(screen, (record.id, ready), show)
 
-    def _show_once(self, screen: CaptureScreen, key: tuple[object, ...], show: object) -> None:
+    def _show_once(self, screen: CaptureScreen, key: tuple[object, ...], show: Callable[[], None]) -> None:
         screen.offer_live(self.deck.camera is not None)
         if screen.live_wanted:
             self._shown = None
@@ -230,7 +232,7 @@ class CaptureSteps(QObject):
         else:
             self._host.attempt(lambda: session.fire(Event.GO_LESIONS))
 
-    def _found(self, outcome: object) -> None:
+    def _found(self, outcome: SearchOutcome) -> None:
         session = self._host.session
         self._host.attempt(lambda: session.adopt_search(outcome))
         if outcome.warnings:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance, Slot
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -102,7 +102,7 @@ class LesionDetails(QFrame):
         self.strip = DermoscopyStrip()
         self._build()
 
-    def _button(self, text: str, symbol: str, name: str, signal: object) -> QPushButton:
+    def _button(self, text: str, symbol: str, name: str, signal: SignalInstance | None) -> QPushButton:
         button = QPushButton(icon(symbol, palette.SECONDARY), f" {text}")
         button.setObjectName(name)
         if signal is not None:

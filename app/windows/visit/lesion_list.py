@@ -80,7 +80,7 @@ class LesionList(QTableWidget):
         header.setMinimumSectionSize(40)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.setColumnWidth(0, 44)
-        self.setColumnWidth(2, 262)
+        self.setColumnWidth(2, 280)
         self._quiet = False
         self.itemSelectionChanged.connect(self._on_selection)
         self.itemActivated.connect(lambda item: self.lesion_activated.emit(str(item.data(_ID))))
@@ -91,7 +91,7 @@ class LesionList(QTableWidget):
         self._quiet = True
         self.setRowCount(len(lines))
         for row, line in enumerate(lines):
-            texts = (str(line.number), line.site or "no site yet", line.status)
+            texts = (str(line.number), line.site or "no site", line.status)
             for column, text in enumerate(texts):
                 item = QTableWidgetItem(text)
                 item.setData(_ID, line.id)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Slot
 
@@ -65,7 +67,7 @@ class LesionStep(QObject):
         """The selected lesion."""
         return self._selected
 
-    def _attempt(self, act: object) -> object:
+    def _attempt(self, act: Callable[[], Any]) -> Any:
         return self._host.attempt(act)
 
     # --- what is shown -------------------------------------------------------------------------------
@@ -240,12 +242,12 @@ class LesionStep(QObject):
         self._capture_id = capture_id
         self.refresh()
 
-    def _on_selected(self, act: object) -> None:
+    def _on_selected(self, act: Callable[[int], Any]) -> None:
         if self._selected is not None:
             lesion_id = self._selected
             self._attempt(lambda: act(lesion_id))
 
-    def _decide(self, act: object) -> None:
+    def _decide(self, act: Callable[[int], Any]) -> None:
         """Decide on the selected lesion and go on to the next that waits."""
         lesion_id = self._selected
         if lesion_id is None:

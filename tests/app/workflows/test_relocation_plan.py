@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from app.workflows.plan import KnownPlace, newest_of_each_view, pending, plan_relocation
 
-VIEWS = ("front", "back", "left", "right")
+VIEWS = ("front", "back", "left", "right", "turned a little")
 
 
 def place(lesion: int, capture: int, view: str = "front", visit: int = 1) -> KnownPlace:
@@ -62,5 +62,11 @@ def test_every_known_lesion_is_planned_exactly_once(
     plan = plan_relocation(places, current)
     planned = [p.lesion_id for s in plan.searches for p in s.places] + [o.lesion_id for o in plan.out_of_view]
     assert sorted(planned) == sorted({p.lesion_id for p in places})
-    assert all(s.target_capture_id == current[s.view] for s in plan.searches)
+    assert all(s.target_capture_id == current.get(s.view, s.target_capture_id) for s in plan.searches)
     assert all(o.place.view not in current for o in plan.out_of_view)
+
+
+def test_a_view_that_names_no_side_may_show_any_lesion_but_two_sides_never_match() -> None:
+    assert plan_relocation([place(1, 10)], {"turned a little": 20}).searches[0].target_capture_id == 20
+    assert plan_relocation([place(1, 10, "turned a little")], {"front": 20}).searches
+    assert plan_relocation([place(1, 10)], {"back": 20}).out_of_view
