@@ -5,11 +5,11 @@ Public API
 ``context.store``            `core.records.ClinicStore`
 ``context.user``             the `User` logged in, or None; ``context.user_id`` raises if nobody is
 ``context.tasks``            `app.tasks.TaskRunner`
-``context.settings``         `app.settings.Settings` (frozen); change with ``context.change_settings(privacy_mode=True)``
+``context.settings``         `app.settings.Settings` (frozen); ``context.change_settings(privacy_mode=True)``
 ``context.privacy_mode``     names are hidden; use ``context.patient_title(patient)`` wherever a name is shown
 ``context.demonstration``    True on the demonstration clinic
 ``context.cameras``          `CameraSource`: ``.list() -> list[DeviceInfo]``, ``.open(id) -> DepthCamera``
-``context.tracker()``        the `core.anchors.SkeletonTracker` (made on first use; call it in a task: it is slow)
+``context.tracker()``        the `core.anchors.SkeletonTracker` (slow on first use: call it in a task)
 ``context.method``           the relocation method's name, or None for the default
 
 Signals: ``user_changed()``, ``privacy_changed(bool)``, ``records_changed(int)`` (patient id; emit it with
@@ -18,6 +18,7 @@ Signals: ``user_changed()``, ``privacy_changed(bool)``, ``records_changed(int)``
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from devices.camera import DepthCamera, DeviceInfo
 
 
+_SLOW_KIND = "openni"
+
+
 class CameraSource(Protocol):
     """Where cameras come from: the device registry, or the demonstration's scripted patient."""
 
@@ -45,13 +49,34 @@ class CameraSource(Protocol):
 
 
 class RegisteredCameras:
-    """The cameras of `devices.registry`."""
+    """The cameras of `devices.registry`.
 
-    def list(self) -> list[DeviceInfo]:
-        """Every camera that could be opened now."""
+    Asking the OpenNI2 runtime what is connected starts a process and may take seconds: it is done in the
+    background, and `list` tells what was found last.
+    """
+
+    def __init__(self) -> None:
+        self._connected: list[DeviceInfo] = []
+        self._looking: threading.Thread | None = None
+
+    def look(self) -> None:
+        """Look for connected cameras in the background."""
+        if self._looking is None or not self._looking.is_alive():
+            self._looking = threading.Thread(target=self._look, name="connected-cameras", daemon=True)
+            self._looking.start()
+
+    def _look(self) -> None:
         from devices.registry import list_devices
 
-        return list(list_devices())
+        self._connected = list(list_devices(_SLOW_KIND))
+
+    def list(self) -> list[DeviceInfo]:
+        """Every camera that could be opened, connected ones as last seen."""
+        from devices.registry import camera_kinds, list_devices
+
+        self.look()
+        quick = [d for kind in camera_kinds() if kind != _SLOW_KIND for d in list_devices(kind)]
+        return [*self._connected, *quick]
 
     def open(self, camera_id: str) -> DepthCamera:
         """The camera with that id."""

@@ -164,6 +164,7 @@ class MainWindow(QMainWindow):
             self._patients = page
             self.stack.addWidget(page)
         self._leave_visit()
+        self._patients.refresh()  # type: ignore[attr-defined]
         self._show_page(self._patients)
 
     @Slot(int)

@@ -36,7 +36,6 @@ class PatientsPage(QWidget):
         self._context = context
         self.search = line_edit("patient_search", "Search by name or clinic number")
         self.search.setClearButtonEnabled(True)
-        self.search.addAction(icon("search", palette.SECONDARY), self.search.ActionPosition.LeadingPosition)
         self.search.setMinimumWidth(420)
         self._pause = QTimer(self, singleShot=True, interval=_TYPING_PAUSE_MS)
         self._pause.timeout.connect(self.refresh)
@@ -68,6 +67,8 @@ class PatientsPage(QWidget):
         style_class(self.count, "caption")
         self.empty = EmptyState("patients", "No patients yet", "Enter the first one.", "New patient")
         self.empty.action_triggered.connect(self.new_patient)
+        for button in self.empty.findChildren(QPushButton):
+            style_class(button, "primary")
         self.nobody = EmptyState("search", "Nobody found", "Try a shorter part of the name or the number.")
         self._build()
         context.privacy_changed.connect(lambda _: self.refresh())
