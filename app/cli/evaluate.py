@@ -77,9 +77,10 @@ def ladder_table(rows: Sequence[LadderRow]) -> str:
     for row in rows:
         s = row.summary
         radius = f"{100 * s.within_radius:8.0f} %" if s.within_radius == s.within_radius else "         -"
+        interval = f"{s.mean_low_mm:.1f}-{s.mean_high_mm:.1f}"
         lines.append(
-            f"{row.joints:8} {row.group:13} {row.method:16} {s.mean_mm:6.1f}"
-            f"  {s.mean_low_mm:6.1f}-{s.mean_high_mm:<6.1f} {s.median_mm:6.1f} {s.p95_mm:6.1f}  {100 * s.within_10mm:3.0f} %  {s.beyond_100mm:6d} {radius}"
+            f"{row.joints:8} {row.group:13} {row.method:16} {s.mean_mm:6.1f}  {interval:>14}"
+            f" {s.median_mm:6.1f} {s.p95_mm:6.1f}  {100 * s.within_10mm:3.0f} %  {s.beyond_100mm:6d} {radius}"
             f"  {s.answered:4d} of {s.lesions:<4d} {s.hidden_said:3d} of {s.hidden}"
         )
     return "\n".join(lines)

@@ -25,7 +25,10 @@ _LIMBS = (
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """A segment with the rigid motion that takes it from the first visit to the follow-up."""
+    """A segment with the rigid motion that takes it from the first visit to the follow-up.
+
+    `parent` is the number of the bone it hangs on; None for the trunk, which comes first.
+    """
 
     name: str
     start: FloatArray
@@ -33,6 +36,7 @@ class Bone:
     radius_m: float
     rotation: FloatArray
     moved_start: FloatArray
+    parent: int | None = None
 
 
 def rigid_fit(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -86,17 +90,26 @@ def bones(pair: VisitPair) -> tuple[Bone, ...]:
     shared = set(pair.first.skeleton.visible()) & set(pair.followup.skeleton.visible())
     out = [_trunk(pair, shared, rotation, centre1, centre2)]
     for root, middle, tip, thick, thin in _LIMBS:
-        parent = rotation
+        parent, parent_bone = rotation, 0
         for near, far, radius in ((root, middle, thick), (middle, tip, thin)):
             if near not in shared or far not in shared:
                 break
             (a1, a2), (b1, b2) = pair.joints_m(near), pair.joints_m(far)
             parent = minimal_rotation(parent @ (b1 - a1), b2 - a2) @ parent
-            out.append(Bone(f"{near} to {far}", a1, b1, radius, parent, a2))
+            out.append(Bone(f"{near} to {far}", a1, b1, radius, parent, a2, parent_bone))
+            parent_bone = len(out) - 1
     if {"neck", "head"} <= shared:
         (a1, a2), (b1, b2) = pair.joints_m("neck"), pair.joints_m("head")
         out.append(
-            Bone("neck to head", a1, b1, 0.09, minimal_rotation(rotation @ (b1 - a1), b2 - a2) @ rotation, a2)
+            Bone(
+                "neck to head",
+                a1,
+                b1,
+                0.09,
+                minimal_rotation(rotation @ (b1 - a1), b2 - a2) @ rotation,
+                a2,
+                0,
+            )
         )
     return tuple(out)
 

@@ -113,7 +113,7 @@ def explain_lesion(
     fields2 = FIELDS.fields(followup.scan.surface, anchor_points(followup, names), kind)
     lesion = PickedLesion(query, pick.point, pick.normal)
     pixels = None if kind == "virtual-source" else first.scan.surface
-    signature = lesion_signatures(fields1, [lesion], pair.sigma_m(names), 0.0, at_pixels_of=pixels)[0]
+    signature = lesion_signatures(fields1, [lesion], at_pixels_of=pixels)[0]
     surface = followup.scan.surface
     edges = (
         grid_edges(surface.vertex_of_pixel, surface.vertices)

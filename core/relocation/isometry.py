@@ -29,6 +29,7 @@ def solve_shifts(
     slopes: FloatArray,
     prior_m: FloatArray,
     spread: FloatArray,
+    expected: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Shifts of the follow-up's nodes and what is left of their uncertainty.
 
@@ -42,6 +43,8 @@ def solve_shifts(
         Standard deviation of each node's own place.
     spread : ndarray (m, m)
         Standard deviation of each distance.
+    expected : ndarray (m, 2), optional
+        Shifts that the nodes' own evidence asks for; zero by default.
 
     Returns
     -------
@@ -67,13 +70,14 @@ def solve_shifts(
     jacobian[rows, two] = slopes[two, one]
     flat = jacobian.reshape(len(one), 2 * count)
     prior = np.repeat(1.0 / prior_m**2, 2)
-    shift = np.zeros(2 * count)
+    wished = np.zeros(2 * count) if expected is None else expected.reshape(2 * count)
+    shift = wished.copy()
     normal = np.diag(prior)
     for _ in range(ROUNDS):
         left = (residual + flat @ shift) / scale
         weight = (FREEDOM + 1.0) / (FREEDOM + left**2) / scale**2
         normal = flat.T @ (weight[:, None] * flat) + np.diag(prior)
-        step = np.linalg.solve(normal, -flat.T @ (weight * residual)) - shift
+        step = np.linalg.solve(normal, prior * wished - flat.T @ (weight * residual)) - shift
         shift = shift + step
         if float(np.abs(step).max(initial=0.0)) < 1e-5:
             break

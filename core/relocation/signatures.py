@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,11 +48,14 @@ class LesionSignature:
         return int(np.isfinite(self.distances_m).sum())
 
 
+Spread = Callable[[FloatArray, FloatArray], FloatArray]
+"""Spread (a, k) of distances (a, k) from the anchors to places (k, 3)."""
+
+
 def lesion_signatures(
     fields: GeodesicFields,
     lesions: Sequence[PickedLesion],
-    anchor_sigma_m: FloatArray,
-    stretch: float,
+    spread: Spread | None = None,
     *,
     at_pixels_of: BodySurface | None = None,
 ) -> tuple[LesionSignature, ...]:
@@ -62,10 +65,8 @@ def lesion_signatures(
     ----------
     fields : GeodesicFields
         Of the first visit.
-    anchor_sigma_m : ndarray (a,)
-        What each anchor adds to the spread.
-    stretch : float
-        Share of a distance that a change of stance may add or take (METHOD section 3).
+    spread : callable, optional
+        How far a distance may differ between visits; without it `LesionSignature.sigma_m` is zero.
     at_pixels_of : BodySurface, optional
         Read the nearest depth pixel of this surface (the thesis) instead of the point between vertices.
     """
@@ -75,13 +76,9 @@ def lesion_signatures(
         distances = fields.distances[:, [nearest_corner(at_pixels_of, p.point) for p in lesions]]
     else:
         distances = fields.at([p.point for p in lesions])
+    places = np.array([p.point.position_m for p in lesions])
+    sigma = np.zeros_like(distances) if spread is None else spread(distances, places)
     return tuple(
-        LesionSignature(
-            lesion.query.id,
-            fields.names,
-            column,
-            np.hypot(anchor_sigma_m, stretch * np.where(np.isfinite(column), column, 0.0)),
-            np.asarray(lesion.point.position_m),
-        )
-        for lesion, column in zip(lesions, distances.T, strict=True)
+        LesionSignature(lesion.query.id, fields.names, distances[:, k], sigma[:, k], places[k])
+        for k, lesion in enumerate(lesions)
     )

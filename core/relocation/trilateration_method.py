@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from core.relocation.bones import Bone, bones, carry, nearest_bone
+from core.relocation.bones import carry, nearest_bone
 from core.relocation.network import AnchorNetwork, build_network
 from core.relocation.pair import PickedLesion, VisitPair
 from core.relocation.posterior import confidence, radius95_m, skin_region
@@ -36,21 +36,18 @@ class TrilaterationMethod:
         network = build_network(pair, context)
         context.progress(0.85, "Trilaterating")
         with context.clock.phase("trilateration"):
-            signatures = lesion_signatures(network.first, lesions, network.sigma_m, network.stretch)
-            skeleton = bones(pair)
-            estimates = tuple(_estimate(pair, network, s, skeleton) for s in signatures)
+            signatures = lesion_signatures(network.first, lesions, network.distance_spread_m)
+            estimates = tuple(_estimate(pair, network, s) for s in signatures)
         return MethodOutcome(estimates)
 
 
-def _estimate(
-    pair: VisitPair, network: AnchorNetwork, signature: LesionSignature, skeleton: tuple[Bone, ...]
-) -> Estimate:
+def _estimate(pair: VisitPair, network: AnchorNetwork, signature: LesionSignature) -> Estimate:
     if signature.reached < LEAST_ANCHORS:
         return Estimate(
             None,
             reason=f"Only {signature.reached} anchors reach the lesion; {LEAST_ANCHORS} are needed.",
         )
-    expected = None
+    expected, skeleton = None, network.joints.bones
     if skeleton:
         place = carry(signature.position_m, nearest_bone(signature.position_m, skeleton))
         expected = neighbourhood_cost(network.field.vertices, place, NEIGHBOURHOOD_M)

@@ -49,9 +49,7 @@ class VotingMethod:
         with context.clock.phase("voting"):
             surface = pair.followup.scan.surface
             edges = self.edges(surface, followup.triangles)
-            signatures = lesion_signatures(
-                first, lesions, pair.sigma_m(names), 0.0, at_pixels_of=pair.first.scan.surface
-            )
+            signatures = lesion_signatures(first, lesions, at_pixels_of=pair.first.scan.surface)
             estimates = [
                 _estimate(
                     s,
