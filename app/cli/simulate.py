@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import typer
@@ -30,6 +31,8 @@ def simulate(
     """Write a capture of a simulated patient. The true places of its lesions go into lesions.json."""
     if out.exists():
         raise InputError(f"{out}: exists already.", "Choose another name.")
+    if not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
+        raise InputError(f"{out}: the folder it would be in does not exist or cannot be written.")
     from core.capture import write_capture
     from devices.simulator import SimulatedPatient
 
@@ -58,7 +61,9 @@ def simulate(
         for i, pixel, seen in zip(truth.mole_ids, truth.mole_pixels, truth.mole_visible, strict=True)
         if seen and str(i) in {str(lesion) for lesion in patient.lesion_ids}
     ]
-    lesions.write_text(json.dumps({"lesions": listed}, indent=1), encoding="utf-8")
+    partial = lesions.with_name(lesions.name + ".part")
+    partial.write_text(json.dumps({"lesions": listed}, indent=1), encoding="utf-8")
+    partial.replace(lesions)
     typer.echo(
         f"{out}: {stance}, {view}, visit {visit}, {frames} depth frames, {len(listed)} lesions in view"
     )
