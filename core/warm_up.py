@@ -8,8 +8,8 @@ import time
 def warm_up() -> float:
     """Run every compiled kernel once; return the seconds it took.
 
-    About a minute on a fresh installation, where the kernels are compiled and cached beside the code; a second
-    or two later on, when they are loaded. For set-up or a background thread, never for a click.
+    About a minute on a fresh installation, where the kernels are compiled and cached beside the code; a
+    second or two later on, when they are loaded. For set-up or a background thread, never for a click.
     """
     from core.geodesics import warm_up as warm_up_geodesics
     from core.surface import warm_up as warm_up_surface
