@@ -9,17 +9,20 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.demo.places import site_in_words
 from app.workflows.session import VisitSession
 from app.workflows.table import Event
 from core.errors import GeodermError
 from core.progress import Progress, ScaledProgress, no_progress
 from core.records import ClinicStore, PatientDraft
+from core.records.sites import skin_sites
 from devices.simulator.camera_device import SimulatedScene
 
 if TYPE_CHECKING:
@@ -132,11 +135,14 @@ def _first_visit(
         truth = camera.last.truth
     session.fire(Event.GO_LESIONS)
     capture_id = max(session.snapshot.views.values())
+    sites = {site.name: site for site in skin_sites()}
     with tempfile.TemporaryDirectory() as scratch:
         for i, name in enumerate(sample_lesions(truth, person.lesion_ids, lesions)):
             progress(0.8 + 0.15 * i / lesions, "Marking lesions")
             u, v = truth.mole_pixels[truth.mole_ids.index(name)]
             lesion, _ = session.mark(capture_id, (float(u), float(v)))
+            site_name, side = site_in_words(truth, name)
+            session.set_site(lesion.id, replace(sites[site_name], laterality=side))
             image = Path(scratch) / f"{name}.png"
             image.write_bytes(person.dermoscopy_png(name, 1))
             session.attach_dermoscopy(lesion.id, image)

@@ -102,7 +102,9 @@ class WindowDriver:
         QTest.mouseClick(field, Qt.MouseButton.LeftButton)
         if isinstance(field, QLineEdit | QPlainTextEdit):
             field.selectAll()
-        if text.isascii():
+        if not text:
+            QTest.keyClick(field, Qt.Key.Key_Delete)
+        elif text.isascii():
             QTest.keyClicks(field, text)
         else:
             for character in text:
@@ -114,7 +116,9 @@ class WindowDriver:
     def choose(self, name: str, text: str) -> None:
         """Choose the entry of a combo box that contains ``text``, with the keyboard."""
         box = self.find(name, QComboBox)
-        row = next((i for i in range(box.count()) if text.lower() in box.itemText(i).lower()), -1)
+        entries = [box.itemText(i).lower() for i in range(box.count())]
+        whole = [i for i, entry in enumerate(entries) if entry == text.lower()]
+        row = next(iter(whole or [i for i, entry in enumerate(entries) if text.lower() in entry]), -1)
         if row < 0:
             raise DriverError(f"'{name}' has no entry '{text}'")
         box.setFocus()

@@ -14,6 +14,7 @@ import numpy as np
 
 from app.demo.clinic import FOLLOW_UP_STANCE, sample_lesions
 from app.demo.driver import WORK_TIMEOUT_S, DriverError, WindowDriver
+from app.demo.places import site_in_words
 from app.demo.scene import DemoCameras
 from app.gui import application, open_clinic, open_window
 from app.logs import log_path, start_logging
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from devices.simulator.truth import CaptureTruth
 
 DEMO_USER = ("asommer", "Dr Ada Sommer", "demo-clinic-2026")
-SITES = ("chest", "abdomen", "thigh", "upper arm", "forearm", "lower leg")
 CORRECT_FROM_MM = 25.0
 
 
@@ -260,7 +260,7 @@ class Tour:
                     image = Path(folder) / f"{name}.png"
                     image.write_bytes(patient.dermoscopy_png(name, 1))
                     page.attach_dermoscopy([image])
-                    self._describe(i)
+                self._describe(name, i)
             page.lesions.screen.photo.fit()
             self.hands.settle(0.5)
             self.hands.shoot("mark")
@@ -279,18 +279,15 @@ class Tour:
         self.hands.click("pane_photo")
         self.hands.click("lesions_primary")
 
-    def _describe(self, i: int) -> None:
-        from PySide6.QtCore import Qt
-        from PySide6.QtTest import QTest
-
-        self.hands.type("site_search", SITES[i % len(SITES)])
-        self.hands.settle(0.4)
-        field = self.hands.find("site_search")
+    def _describe(self, name: str, i: int) -> None:
+        site, side = site_in_words(self._truth, name)
+        self.hands.type("site_search", site[:-2])
+        self.hands.settle(0.3)
         if i == 0:
             self.hands.shoot("mark_site")
-        QTest.keyClick(field, Qt.Key.Key_Down)
-        QTest.keyClick(field, Qt.Key.Key_Return)
-        self.hands.settle(0.2)
+        self.hands.type("site_search", site, enter=True)
+        if side:
+            self.hands.choose("site_side", side)
 
     def _close_visit(self, picture: str) -> None:
         self.hands.find("review_screen")
@@ -352,11 +349,15 @@ class Tour:
         if not page.session.status(lesion_id).needs_doctor:
             return
         i = truth.mole_ids.index(name)
+        placed = o is not None and o.pixel is not None
+        u, v = (float(c) for c in truth.mole_pixels[i])
         if not truth.mole_visible[i]:
-            self.hands.click("lesion_not_in_view")
-        elif o is not None and o.pixel is not None and (error.error_mm or 0.0) > CORRECT_FROM_MM:
-            u, v = truth.mole_pixels[i]
-            self.hands.drag_photo("lesion_photo", o.pixel, (float(u), float(v)))
+            self.hands.click("lesion_not_in_view" if placed else "confirm_lesion")
+        elif not placed:
+            self.hands.click("place_lesion")
+            self.hands.click_photo("lesion_photo", u, v)
+        elif (error.error_mm or 0.0) > CORRECT_FROM_MM:
+            self.hands.drag_photo("lesion_photo", o.pixel, (u, v))  # type: ignore[union-attr, arg-type]
         else:
             self.hands.click("confirm_lesion")
         self.hands.wait_until(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QWidget
 
 from app.context import AppContext
@@ -59,7 +60,7 @@ class CompareSheet(Sheet):
         box.addItems(self._titles)
         return box
 
-    def _picture(self, image: DermoscopicImage):  # type: ignore[no-untyped-def]
+    def _picture(self, image: DermoscopicImage) -> QImage:
         return image_from_bytes(self._context.store.dermoscopy.data(image.id))
 
     def _show(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +29,7 @@ from app.widgets.photo_view import PhotoView
 from app.widgets.status import EmptyState, MessageBanner, ProgressOverlay
 from app.widgets.tables import Column, LesionRow, LesionTable, Row, RowTable
 from app.windows.compare_sheet import CompareSheet
-from app.windows.patient_model import PatientModel
+from app.windows.patient_model import LesionSummary, PatientModel
 from app.windows.patient_sheet import PatientSheet
 from app.windows.visit.pictures import stored_picture
 from app.workflows.wording import when
@@ -103,7 +104,7 @@ class PatientPage(QWidget):
         column.addWidget(self.banner)
         left = QVBoxLayout()
         left.setSpacing(16)
-        left.addWidget(self._card("Visits", self.visits, self._visit_tools()), 2)
+        left.addWidget(self._card("Visits", self._visit_stack(), self._visit_tools()), 2)
         left.addWidget(self._card("Lesions", self._lesion_stack(), self._lesion_tools()), 3)
         row = QHBoxLayout()
         row.setSpacing(16)
@@ -176,6 +177,13 @@ class PatientPage(QWidget):
         self.compare = self._tool("compare_dermoscopy", "Compare dermoscopy", "compare")
         self.compare.clicked.connect(lambda: self._compare(self._selected or ""))
         return [self.compare]
+
+    def _visit_stack(self) -> QStackedWidget:
+        self.no_visits = EmptyState("calendar", "No visits yet", "The first one marks the lesions.")
+        self.visit_stack = QStackedWidget()
+        self.visit_stack.addWidget(self.visits)
+        self.visit_stack.addWidget(self.no_visits)
+        return self.visit_stack
 
     def _lesion_stack(self) -> QStackedWidget:
         self.no_lesions = EmptyState("target", "No lesions yet", "They are marked in a visit, on the photo.")
@@ -252,8 +260,6 @@ class PatientPage(QWidget):
         self.title.setText(self._context.patient_title(p))
         parts = []
         if not self._context.privacy_mode and p.birth_date is not None:
-            from datetime import date
-
             parts.append(f"born {p.birth_date:%d %b %Y}, {p.age_on(date.today())} years")
         parts += [_SEX[p.sex], p.clinic_number if not self._context.privacy_mode else "", p.note]
         self.details.setText("   ·   ".join(x for x in parts if x))
@@ -271,6 +277,7 @@ class PatientPage(QWidget):
             for v in reversed(self._model.visits)
         ]
         self.visits.set_rows(rows)
+        self.visit_stack.setCurrentWidget(self.visits if rows else self.no_visits)
         if rows and self.visits.selected() is None:
             self.visits.set_selected(rows[0].key)
 
@@ -379,7 +386,7 @@ class PatientPage(QWidget):
         chosen = self._chosen_lesion()
         self.compare.setEnabled(chosen is not None and chosen.images > 0)
 
-    def _chosen_lesion(self):  # type: ignore[no-untyped-def]
+    def _chosen_lesion(self) -> LesionSummary | None:
         if self._model is None:
             return None
         return next((s for s in self._model.lesions if str(s.lesion.id) == self._selected), None)

@@ -35,7 +35,6 @@ class PatientsPage(QWidget):
         style_class(self, "page")
         self._context = context
         self.search = line_edit("patient_search", "Search by name or clinic number")
-        self.search.setClearButtonEnabled(True)
         self.search.setMinimumWidth(420)
         self._pause = QTimer(self, singleShot=True, interval=_TYPING_PAUSE_MS)
         self._pause.timeout.connect(self.refresh)

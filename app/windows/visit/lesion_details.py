@@ -129,7 +129,7 @@ class LesionDetails(QFrame):
         last.addStretch(1)
         last.addWidget(self.delete_button)
         column = QVBoxLayout(self)
-        column.setContentsMargins(12, 8, 12, 8)
+        column.setContentsMargins(12, 8, 16, 8)
         column.setSpacing(6)
         column.addLayout(head)
         column.addWidget(self.reason)
@@ -138,6 +138,7 @@ class LesionDetails(QFrame):
         column.addLayout(measures)
         column.addWidget(self.strip)
         column.addLayout(last)
+        column.addStretch(1)
 
     def show_lesion(
         self,

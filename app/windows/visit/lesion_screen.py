@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QTimer, Signal, Slot
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QButtonGroup,
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QProgressBar,
     QPushButton,
+    QScrollArea,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 _BODY_MARGIN = 1.12
 _CLOSE = 4.0
+_LIST_MIN_HEIGHT = 132
+"""Head and two rows: the selected lesion is always in sight."""
 
 PANES = (("photo", "Photo"), ("body", "Photo and 3D body"), ("compare", "Previous visit"))
 
@@ -159,10 +162,17 @@ class LesionScreen(QWidget):
         body.setSpacing(8)
         body.addWidget(self.progress)
         body.addWidget(self.count)
-        body.addWidget(self.list, 1)
+        self.list.setMinimumHeight(_LIST_MIN_HEIGHT)
+        # The form scrolls where the window is low: nothing in it may be squeezed over its neighbour.
+        self.details_area = QScrollArea()
+        self.details_area.setObjectName("lesion_details_area")
+        self.details_area.setWidgetResizable(True)
+        self.details_area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.details_area.setWidget(self.details)
+        body.addWidget(self.list, 2)
         body.addLayout(bulk)
         body.addWidget(self.hint)
-        body.addWidget(self.details)
+        body.addWidget(self.details_area, 3)
         row = QHBoxLayout(self)
         row.setContentsMargins(24, 16, 24, 24)
         row.setSpacing(16)
@@ -294,7 +304,7 @@ class LesionScreen(QWidget):
 
     def show_details(self, on: bool) -> None:
         """Whether a lesion is selected whose details are shown."""
-        self.details.setVisible(on)
+        self.details_area.setVisible(on)
         self.hint.setVisible(not on)
 
     def show_placing(self, on: bool, *, new: bool) -> None:
