@@ -33,8 +33,8 @@ def icon_pixmap(name: str, size: int = 20, color: str = palette.TEXT, ratio: flo
     return pixmap
 
 
-def icon(name: str, color: str = palette.TEXT) -> QIcon:
-    """Icon ``resources/icons/<name>.svg`` in ``color``, faint where its widget is disabled.
+def icon(name: str, color: str = palette.TEXT, disabled: str = palette.BORDER_STRONG) -> QIcon:
+    """Icon ``resources/icons/<name>.svg`` in ``color``, and in ``disabled`` where its widget is disabled.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def icon(name: str, color: str = palette.TEXT) -> QIcon:
     result = QIcon()
     for size in (16, 20, 24, 32, 48):
         result.addPixmap(QPixmap.fromImage(_image(name, color, size)), QIcon.Mode.Normal)
-        result.addPixmap(QPixmap.fromImage(_image(name, palette.BORDER_STRONG, size)), QIcon.Mode.Disabled)
+        result.addPixmap(QPixmap.fromImage(_image(name, disabled, size)), QIcon.Mode.Disabled)
     return result
 
 

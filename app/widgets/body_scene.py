@@ -102,10 +102,13 @@ class BodyScene(QtInteractor):
         self.look_from("front")
 
     def _outward(self, mesh: pv.PolyData) -> FloatArray:
+        """Normals away from the body: toward the camera, or out of a closed mesh."""
         normals = np.asarray(mesh.point_data["Normals"], float)
-        toward_eye = -self._vertices
-        flip = np.median(np.einsum("ij,ij->i", normals, toward_eye)) < 0
-        return -normals if flip else normals
+        along_ray = float(np.median(np.einsum("ij,ij->i", normals, self._vertices)))
+        if mesh.n_open_edges == 0:
+            middle = self._vertices.mean(0)
+            along_ray = -float(np.median(np.einsum("ij,ij->i", normals, self._vertices - middle)))
+        return -normals if along_ray > 0 else normals
 
     def _add(self, mesh: pv.PolyData, *, photo: bool) -> Any:
         actor = self.add_mesh(

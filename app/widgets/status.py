@@ -96,9 +96,8 @@ class StepBar(QFrame):
             done, current = key in self._done, key == self._current
             set_state(button, "phase", "current" if current else "done" if done else "todo")
             button.setEnabled(current or key in self._enabled)
-            button.setIcon(
-                icon("check", palette.ACCENT if current else palette.GREEN) if done else icon("check", "none")
-            )
+            tint = (palette.ACCENT if current else palette.GREEN) if done else "none"
+            button.setIcon(icon("check", tint, disabled=tint))
             button.setText(f"{self._titles[key]}" if done else f"{number}   {self._titles[key]}")
             button.setIconSize(QSize(16, 16) if done else QSize(1, 16))
 
