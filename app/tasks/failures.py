@@ -1,4 +1,4 @@
-"""What happens to an error: the world's are told to the user, the application's own are logged without data."""
+"""What happens to an error: the world's are told to the user, bugs are logged without data."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TaskFailure:
 
 
 def trace_without_data(error: BaseException) -> str:
-    """The trace of ``error`` by file, line and function; no message and no values, which may name a patient."""
+    """The trace of ``error`` by file, line and function; no message, no values: they may name a patient."""
     lines: list[str] = []
     seen: set[int] = set()
     current: BaseException | None = error

@@ -2,7 +2,8 @@
 
 Style classes are set with `style_class(widget, "primary")` and live in ``resources/style/geoderm.qss``:
 
-Buttons   ``primary`` (filled, one per screen), ``secondary`` (default), ``quiet`` (no frame), ``danger``, ``icon``.
+Buttons   ``primary`` (filled, one per screen), ``secondary`` (default), ``quiet`` (no frame), ``danger``,
+    ``icon``.
 Labels    ``title`` (26 px), ``heading`` (18 px), ``secondary``, ``caption``, ``badge``, ``badge-amber``,
           ``badge-green``, ``badge-grey``, ``field`` (form label), ``field-error``.
 Frames    ``card`` (white, border, 10 px radius), ``bar`` (top bar), ``panel`` (soft background), ``line``.

@@ -1,19 +1,25 @@
 """The patient's body in 3D with numbered lesions.
 
-Public API of `BodyView` (a QWidget; the OpenGL part is built when it is first shown and the libraries are loaded)
+Public API of `BodyView` (a QWidget; the OpenGL part is built when it is first shown and the libraries are
+    loaded)
 -------------------------------------------------------------------------------------------------------------
-``set_surface(vertices (n,3), triangles (m,3), colors (n,3) uint8 | None)``   metres, depth-camera frame (x right, y down,
+``set_surface(vertices (n,3), triangles (m,3), colors (n,3) uint8 | None)``   metres, depth-camera frame (x
+    right, y down,
     z forward); keeps the markers. ``clear()`` removes everything.
-``set_lesions(list[BodyLesion])``  numbered markers, drawn 6 mm above the skin; hidden while the body is in front of them
+``set_lesions(list[BodyLesion])``  numbered markers, drawn 6 mm above the skin; hidden while the body is in
+    front of them
 ``set_selected(id | None)``, ``selected()``    highlight without emitting
 ``set_placing(bool)``   a click on the skin emits ``placed(x, y, z)`` (metres, depth-camera frame)
 ``set_view("front" | "back" | "left" | "right")``, ``turn_to(id)`` (look at a lesion from above the skin)
 ``display_position(id) -> QPoint | None``   where a visible marker is in ``canvas()``, for tests
 ``canvas() -> QWidget | None``              the OpenGL widget (receives mouse events), None until ``ready``
-``close_view()``                            frees the OpenGL resources; called by the view itself when its window closes
-Signals: ``lesion_clicked(str id)``, ``lesion_activated(str id)``, ``placed(float, float, float)``, ``background_clicked()``,
+``close_view()``                            frees the OpenGL resources; called by the view itself when its
+    window closes
+Signals: ``lesion_clicked(str id)``, ``lesion_activated(str id)``, ``placed(float, float, float)``,
+    ``background_clicked()``,
 ``ready()``.
-Mouse: left drag turns, right or middle drag (or Shift) moves, the wheel zooms. `surface_colors` takes colours from the photo.
+Mouse: left drag turns, right or middle drag (or Shift) moves, the wheel zooms. `surface_colors` takes
+    colours from the photo.
 """
 
 from __future__ import annotations
@@ -143,7 +149,7 @@ class BodyView(QWidget):
     def set_surface(
         self, vertices: ArrayLike, triangles: ArrayLike, colors: NDArray[np.uint8] | None = None
     ) -> None:
-        """Show a surface: vertices (n, 3) metres in the depth-camera frame, triangles (m, 3), colours (n, 3)."""
+        """Show a surface: vertices (n, 3) metres, depth-camera frame; triangles (m, 3); colours (n, 3)."""
         self._surface = (np.asarray(vertices, float), np.asarray(triangles, np.int32), colors)
         if self._scene is not None:
             self._scene.set_surface(*self._surface)

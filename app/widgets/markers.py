@@ -1,4 +1,4 @@
-"""How a lesion's marker looks, the same on the photo and on the 3D body: a ring round it and a numbered badge."""
+"""How a lesion's marker looks on the photo and on the 3D body: a ring and a numbered badge."""
 
 from __future__ import annotations
 

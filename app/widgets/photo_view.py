@@ -9,10 +9,13 @@ Public API of `PhotoView`
 ``fit()``, ``zoom_by(factor)``, ``center_on(x, y, zoom=None)``, ``center_on_marker(id)``
 ``set_scale_mm(mm_per_pixel | None)``                    draws a scale bar
 ``set_ghost_image(QImage | ndarray | None, opacity)``    a second picture laid over the first
-``viewport_position(x, y) -> QPoint``                    where an image pixel is, for tests: ``QTest.mouseClick(view.viewport(), ...)``
-``view_state()`` / ``set_view_state(state)``             zoom and centre, relative to the picture (for synchronised views)
+``viewport_position(x, y) -> QPoint``                    where an image pixel is, for tests:
+    ``QTest.mouseClick(view.viewport(), ...)``
+``view_state()`` / ``set_view_state(state)``             zoom and centre, relative to the picture (for
+    synchronised views)
 
-Signals: ``marker_clicked(str id)``, ``marker_activated(str id)`` (double click or Enter), ``marker_moved(str id,
+Signals: ``marker_clicked(str id)``, ``marker_activated(str id)`` (double click or Enter), ``marker_moved(str
+    id,
 float x, float y)``, ``placed(float x, float y)``, ``background_clicked()``, ``delete_requested(str id)``,
 ``hovered(str id or "")``, ``view_changed()``.
 

@@ -5,7 +5,8 @@ Public API
 ``Sheet(parent, title, object_name="sheet")``: fill ``sheet.body`` (a QVBoxLayout), add buttons with
     ``sheet.add_button(text, "primary" | "secondary" | "danger" | "quiet", slot, object_name)``; ``open()``,
     ``close_sheet()``; signal ``gone()``. Escape closes it, Tab stays inside.
-``ask(parent, title, text, confirm, on_confirm, *, danger=False) -> Sheet``   buttons ``sheet_confirm``, ``sheet_cancel``
+``ask(parent, title, text, confirm, on_confirm, *, danger=False) -> Sheet``   buttons ``sheet_confirm``,
+    ``sheet_cancel``
 ``tell(parent, title, text) -> Sheet``                                        button ``sheet_ok``
 """
 

@@ -4,9 +4,12 @@ Public API
 ----------
 ``StepBar(steps: Sequence[tuple[str key, str title]])``: ``set_current(key)``, ``set_done(keys)``,
     ``set_enabled_steps(keys)``; signal ``step_clicked(str key)``. Each step is a button named ``step_<key>``.
-``MessageBanner()``: ``show_info|show_success|show_warning|show_error(message, advice="", actions=[(key, text)])``,
-    ``show_failure(TaskFailure)``, ``clear()``; signal ``action_triggered(str key)``. Hidden while it has nothing to say.
-``ProgressOverlay(parent)``: covers its parent; ``attach(task)`` shows title, bar, message and Cancel until the task ends.
+``MessageBanner()``: ``show_info|show_success|show_warning|show_error(message, advice="", actions=[(key,
+    text)])``,
+    ``show_failure(TaskFailure)``, ``clear()``; signal ``action_triggered(str key)``. Hidden while it has
+        nothing to say.
+``ProgressOverlay(parent)``: covers its parent; ``attach(task)`` shows title, bar, message and Cancel until
+    the task ends.
 ``EmptyState(icon, title, text, action="")``: signal ``action_triggered()``; the button is ``empty_action``.
 """
 

@@ -1,4 +1,4 @@
-"""Tables: rows of immutable values, one selection, no cell editing. `LesionTable` is the lesions of a patient.
+"""Tables: rows of immutable values, one selection, no cell editing.
 
 Public API
 ----------
