@@ -134,10 +134,9 @@ class TaskRunner(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        # A plain thread that lives as long as the runner, not a QThreadPool: PySide gives every QRunnable a
-        # new
-        # Python thread state on the same system thread, and extensions that keep the first one (pybind11:
-        # Open3D, MediaPipe) then wait for themselves with the interpreter locked.
+        # A plain thread that lives as long as the runner, not a QThreadPool: PySide gives every QRunnable
+        # a new Python thread state on the same system thread, and extensions that keep the first one
+        # (pybind11: Open3D, MediaPipe) then wait for themselves with the interpreter locked.
         self._queue: queue.SimpleQueue[tuple[Task, Callable[[Progress], Any]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name="geoderm-tasks", daemon=True)
         self._thread.start()
