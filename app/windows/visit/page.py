@@ -30,6 +30,7 @@ from PySide6.QtWidgets import (
 
 from app.tasks import TaskFailure
 from app.theme import icon, palette, style_class
+from app.widgets.body_view import BodyView
 from app.widgets.status import MessageBanner, ProgressOverlay, StepBar
 from app.windows.visit.capture_steps import CaptureSteps
 from app.windows.visit.dermoscopy_sheet import show_dermoscopy
@@ -313,4 +314,6 @@ class VisitPage(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102
         self.leave()
+        for view in self.findChildren(BodyView):
+            view.close_view()
         super().closeEvent(event)
