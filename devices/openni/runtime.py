@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from core.errors import WorkError
+from devices.openni.binding import load_binding
 
 _LIBRARY = {"win32": "OpenNI2.dll", "darwin": "libOpenNI2.dylib"}.get(sys.platform, "libOpenNI2.so")
 
@@ -36,15 +37,7 @@ def load_runtime() -> ModuleType:
     WorkError
         If no runtime can be loaded; the message names the folders that were tried.
     """
-    try:
-        from primesense import openni2
-    except ImportError:
-        try:
-            from openni import openni2
-        except ImportError as error:
-            raise WorkError(
-                "The Python binding of OpenNI2 is not installed.", "Run `make setup` again."
-            ) from error
+    openni2 = load_binding()
     tried = []
     for folder in runtime_folders():
         tried.append(str(folder))
@@ -55,7 +48,7 @@ def load_runtime() -> ModuleType:
         except Exception as error:  # noqa: BLE001 - the binding raises its own and ctypes' kinds alike
             tried[-1] += f" ({str(error).splitlines()[0]})"
             continue
-        return openni2  # type: ignore[no-any-return]
+        return openni2
     raise WorkError(
         f"The OpenNI2 runtime was not found; looked in {', '.join(tried) or 'no folder'}.",
         "Install it (Debian, Ubuntu: apt-get install libopenni2-0) or set OPENNI2_REDIST64 to its folder.",

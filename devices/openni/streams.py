@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import WorkError
+from devices.openni.binding import binding_part
 
 _DEPTH_UNITS_M = {100: 1e-3, 101: 1e-4}
 _RGB888 = 200
@@ -57,11 +58,10 @@ class StreamBatch:
 
 def _told(getter: Callable[[], Any]) -> Any:
     """Value of a property, or None where the driver does not know it: one without mirroring mirrors not."""
-    from primesense.utils import OpenNIError
-
+    refusal: type[Exception] = binding_part("utils").OpenNIError
     try:
         return getter()
-    except OpenNIError:
+    except refusal:
         return None
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import GeodermError, WorkError
+from devices.openni.binding import binding_part
 from devices.openni.runtime import load_runtime
 from devices.openni.streams import OpenedStream, StreamBatch, StreamInfo
 
@@ -66,15 +67,13 @@ class _Session:
         """Address and name of every connected device."""
         import ctypes
 
-        from primesense import _openni2 as c_api
-
-        runtime = self._runtime
+        c_api = binding_part("_openni2")
+        _ = self._runtime  # must be initialised
         pointer = ctypes.POINTER(c_api.OniDeviceInfo)()
         count = ctypes.c_int()
         c_api.oniGetDeviceList(ctypes.byref(pointer), ctypes.byref(count))
         found = [(pointer[i].uri.decode(), pointer[i].name.decode()) for i in range(count.value)]
         c_api.oniReleaseDeviceList(pointer)
-        del runtime
         return found
 
     def open(self, report: Callable[[float], None], address: str, is_file: bool) -> dict[str, StreamInfo]:
