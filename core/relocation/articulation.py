@@ -17,7 +17,7 @@ from core.relocation.pair import VisitPair
 
 FloatArray = NDArray[np.float64]
 
-SPREAD_M_PER_RAD = 0.2
+SPREAD_M_PER_RAD = 0.35
 """Learned on the tuning bodies."""
 
 

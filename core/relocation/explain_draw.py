@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -50,7 +51,18 @@ class Backdrop:
     def place(self, points_m: FloatArray) -> FloatArray:
         """Backdrop pixels (n, 2) of points (n, 3)."""
         pixels = self.analysed.capture.rig.project_to_picture(points_m)
-        return (pixels - self.offset) * self.scale
+        return np.asarray((pixels - self.offset) * self.scale)
+
+    @cached_property
+    def triangle_map(self) -> NDArray[np.int32]:
+        """Triangle of the skin behind every pixel (h, w), farther ones under nearer ones; -1 without skin."""
+        surface = self.analysed.scan.surface
+        order = np.argsort(-surface.vertices[surface.triangles, 2].max(axis=1))
+        corners = np.rint(self.place(surface.vertices) * 16).astype(np.int32)[surface.triangles[order]]
+        out = np.full(self.image.shape[:2], -1, np.int32)
+        for number, polygon in zip(order.tolist(), corners, strict=True):
+            cv2.fillConvexPoly(out, polygon, number, cv2.LINE_8, 4)
+        return out
 
 
 def backdrop(analysed: AnalysedCapture, height: int = HEIGHT) -> Backdrop:
@@ -129,24 +141,13 @@ def draw_explanation(
     }
 
 
-def _paint(
-    canvas: Rgb, at: Backdrop, chosen: NDArray[np.bool_], color: FloatArray, opacity: FloatArray
-) -> None:
-    """Fill the triangles whose corners are all chosen with the mean colour (n, 3) and opacity (n,)."""
-    surface = at.analysed.scan.surface
-    triangles = surface.triangles[chosen[surface.triangles].all(axis=1)]
-    if len(triangles) == 0:
-        return
-    layer = canvas.copy()
-    strength = np.zeros(canvas.shape[:2], np.float32)
-    corners = np.rint(at.place(surface.vertices) * 16).astype(np.int32)[triangles]
-    fill = color[triangles].mean(axis=1)
-    share = opacity[triangles].mean(axis=1)
-    for polygon, rgb, alpha in zip(corners, fill.tolist(), share.tolist(), strict=True):
-        cv2.fillConvexPoly(layer, polygon, rgb, cv2.LINE_8, 4)
-        cv2.fillConvexPoly(strength, polygon, alpha, cv2.LINE_8, 4)
-    blend = strength[..., None]
-    canvas[:] = (canvas * (1 - blend) + layer * blend).astype(np.uint8)
+def _paint(canvas: Rgb, at: Backdrop, chosen: NDArray[np.bool_], color: FloatArray, opacity: float) -> None:
+    """Fill the triangles whose corners are all chosen with their corners' mean colour (n, 3)."""
+    triangles = at.analysed.scan.surface.triangles
+    shown = np.append(chosen[triangles].all(axis=1), False)
+    mask = shown[at.triangle_map]
+    fill = color[triangles[at.triangle_map[mask]]].mean(axis=1)
+    canvas[mask] = (canvas[mask] * (1 - opacity) + fill * opacity).astype(np.uint8)
 
 
 def _draw_bands(at: Backdrop, explanation: LesionExplanation, colors: Mapping[str, Color]) -> Rgb:
@@ -154,8 +155,7 @@ def _draw_bands(at: Backdrop, explanation: LesionExplanation, colors: Mapping[st
     palette = np.array([colors[name] for name in explanation.anchor_names], dtype=float)
     for i in range(len(explanation.anchor_names)):
         member = explanation.bands[i]
-        count = len(member)
-        _paint(canvas, at, member, np.broadcast_to(palette[i], (count, 3)), np.full(count, 0.42))
+        _paint(canvas, at, member, np.broadcast_to(palette[i], (len(member), 3)), 0.42)
     return canvas
 
 
@@ -163,7 +163,7 @@ def _draw_votes(at: Backdrop, explanation: LesionExplanation) -> Rgb:
     canvas = at.image.copy()
     votes = explanation.votes
     color = _ramp(votes / max(int(votes.max()), 1))
-    _paint(canvas, at, np.ones(len(votes), bool), color, np.full(len(votes), 0.9))
+    _paint(canvas, at, np.ones(len(votes), bool), color, 0.9)
     return canvas
 
 

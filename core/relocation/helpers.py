@@ -13,10 +13,10 @@ from core.surface import BodySurface, SurfacePoint
 
 FloatArray = NDArray[np.float64]
 
-HELPERS = 24
+HELPERS = 32
 RIM_M = 0.03
 """Helpers keep this far from the rim in the first visit, half as far in the follow-up."""
-APART_M = 0.05
+APART_M = 0.04
 AGREEING = 0.6
 """Share of the anchors that must agree about a helper."""
 LEAST_ANCHORS = 5

@@ -16,6 +16,7 @@ from core.relocation.helpers import place_helpers
 from core.relocation.isometry import residual_sigma, solve_shifts
 from core.relocation.pair import VisitPair, anchor_points
 from core.relocation.registry import MethodContext
+from core.relocation.shortcuts import is_shortcut, moved
 from core.relocation.tangent import tangent_slopes
 from core.relocation.trilateration import STRETCH, SkinField, vertex_areas
 from core.surface import BodySurface, SurfacePoint
@@ -77,7 +78,8 @@ def build_network(pair: VisitPair, context: MethodContext) -> AnchorNetwork:
         second = FIELDS.fields(surface2, points, KIND)
     areas = vertex_areas(surface2.vertices, surface2.triangles)
     joints = articulation(pair, bones(pair))
-    field = _skin_field(second, surface2, areas)
+    first = _without_shortcuts(first, places, joints)
+    field = _skin_field(second, surface2, areas, points, joints)
     network = AnchorNetwork(first, places, points, field, pair.sigma_m(names), joints)
     if not context.options.refine_anchors or len(names) < LEAST_ANCHORS_TO_REFINE:
         return network
@@ -97,9 +99,13 @@ def _refined(pair: VisitPair, network: AnchorNetwork) -> AnchorNetwork:
     helpers2 = {name: two for name, (_, two) in placed.items()}
     prior = np.concatenate([network.sigma_m, np.full(len(placed), HELPER_PRIOR_M)])
     second = FIELDS.fields(surface2, helpers2, KIND)
-    distances = np.vstack([rough.field.distances, second.distances.astype(np.float32)])
+    added = _skin_field(second, surface2, rough.field.areas, helpers2, network.joints)
+    distances = np.vstack([rough.field.distances, added.distances])
     joint = AnchorNetwork(
-        first=_joined(rough.first, FIELDS.fields(surface1, helpers1, KIND)),
+        first=_joined(
+            rough.first,
+            _without_shortcuts(FIELDS.fields(surface1, helpers1, KIND), helpers1, network.joints),
+        ),
         places={**rough.places, **helpers1},
         points={**rough.points, **helpers2},
         field=SkinField(distances, surface2.vertices, rough.field.areas, surface2.boundary),
@@ -138,7 +144,7 @@ def _shifted(
         network.first,
         network.places,
         points,
-        _skin_field(fields, surface, network.field.areas),
+        _skin_field(fields, surface, network.field.areas, points, network.joints),
         np.maximum(sigma, LEAST_SIGMA_M),
         network.joints,
     )
@@ -148,10 +154,27 @@ def _positions(points: Mapping[str, SurfacePoint]) -> FloatArray:
     return np.array([p.position_m for p in points.values()]).reshape(-1, 3)
 
 
-def _skin_field(fields: GeodesicFields, surface: BodySurface, areas: FloatArray) -> SkinField:
-    return SkinField(
-        np.ascontiguousarray(fields.distances, dtype=np.float32), surface.vertices, areas, surface.boundary
-    )
+def _skin_field(
+    fields: GeodesicFields,
+    surface: BodySurface,
+    areas: FloatArray,
+    points: Mapping[str, SurfacePoint],
+    joints: Articulation,
+) -> SkinField:
+    """Fields of the follow-up for trilateration; shortcuts are unknown distances there."""
+    distances = fields.distances.astype(np.float32)
+    short = is_shortcut(moved(joints.bones), _positions(points), surface.vertices, distances)
+    distances[short] = np.nan
+    return SkinField(distances, surface.vertices, areas, surface.boundary)
+
+
+def _without_shortcuts(
+    fields: GeodesicFields, places: Mapping[str, SurfacePoint], joints: Articulation
+) -> GeodesicFields:
+    """Fields of the first visit in which a shortcut counts as not connected."""
+    short = is_shortcut(joints.bones, _positions(places), fields.vertices, fields.distances)
+    distances = np.where(short, np.inf, fields.distances)
+    return GeodesicFields(fields.names, distances, fields.vertices, fields.triangles, fields.method)
 
 
 def _joined(a: GeodesicFields, b: GeodesicFields) -> GeodesicFields:

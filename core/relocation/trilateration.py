@@ -23,6 +23,8 @@ MEAN_RADIUS_M = 0.06
 FREEDOM = 3.0
 MAX_SQUARED = 200.0
 """Normalised squared residuals are cut here: a farther anchor says no more than "elsewhere"."""
+UNKNOWN = np.float32(1.5 / np.sqrt(FREEDOM))
+"""An unknown distance costs as much as one 1.5 sigma off: no reason to go there, none to stay away."""
 _PRODUCT = 16
 """Logarithms are taken of products of so many terms: single precision holds them."""
 AMBIGUOUS_COST = 2.0
@@ -36,7 +38,7 @@ class SkinField:
     Attributes
     ----------
     distances : ndarray (a, n) float32
-        Geodesic distances of the follow-up; inf where unreachable.
+        Geodesic distances of the follow-up; inf where unreachable, NaN where the true one is unknown.
     vertices : ndarray (n, 3)
     areas : ndarray (n,)
         Skin area of every vertex: a slanted patch has fewer depth pixels than it deserves.
@@ -114,7 +116,8 @@ def cost_field(
     for start in range(0, len(rows), _PRODUCT):
         product = np.ones(distances.shape[1], np.float32)
         for k in range(start, min(start + _PRODUCT, len(rows))):
-            residual = np.minimum(np.abs(distances[rows[k]] - targets[k]) * scale[k], limit)
+            residual = np.abs(distances[rows[k]] - targets[k]) * scale[k]
+            residual = np.where(np.isnan(residual), UNKNOWN, np.minimum(residual, limit))
             product *= np.float32(1.0) + residual * residual
         total += np.log(product)
     return np.asarray(np.float32(4.0) * total, dtype=np.float32)
