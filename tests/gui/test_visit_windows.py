@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
@@ -23,92 +17,13 @@ from app.context import AppContext
 from app.theme import apply_theme
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.page import VisitPage
-from app.workflows.session import VisitSession
-from app.workflows.table import Event, State
-from core.capture import write_capture
-from core.records import ClinicStore, PatientDraft
+from app.workflows.table import State
+from core.records import ClinicStore
 from core.records.sites import find_site
-from devices.camera import DeviceInfo
-from devices.simulator import SimulatedCapture, SimulatedPatient
-from devices.simulator.room import make_rig
 from devices.trackers import default_tracker
+from tests.gui.conftest import PASSWORD, USER, NoCameras, World, seen
 
-pytestmark = pytest.mark.skipif(
-    not (os.environ.get("DISPLAY") or os.environ.get("QT_QPA_PLATFORM")), reason="there is no screen"
-)
 LEFT = Qt.MouseButton.LeftButton
-
-
-class NoCameras:
-    """A computer with no camera: captures come from folders."""
-
-    def list(self) -> list[DeviceInfo]:
-        return []
-
-    def open(self, camera_id: str) -> object:
-        raise AssertionError(camera_id)
-
-
-@pytest.fixture(scope="module")
-def world(tmp_path_factory: pytest.TempPathFactory) -> World:
-    """Capture folders of one simulated patient, and a clinic whose first visit is closed."""
-    root = tmp_path_factory.mktemp("visit")
-    patient = SimulatedPatient("m_young_avg", seed=4, moles=60, freckles=40, rig=make_rig((640, 480)))
-    captures: dict[str, SimulatedCapture] = {}
-    for name, stance, visit in (("psi", "psi", 1), ("down", "down", 1), ("A1", "A", 1), ("A2", "A", 2)):
-        captures[name] = patient.capture(stance, "front", visit, frames=2)
-        write_capture(captures[name].capture, root / name)
-    empty = replace(
-        captures["psi"].capture, depth_frames=np.full_like(captures["psi"].capture.depth_frames, 4000)
-    )
-    write_capture(empty, root / "empty")
-    shutil.copytree(root / "psi", root / "truncated")
-    depth = next((root / "truncated").glob("depth*.png"))
-    depth.write_bytes(depth.read_bytes()[:200])
-    spoil(root, "sizes", lambda doc: doc["color"]["intrinsics"].update(width=320))
-    spoil(root, "calibration", lambda doc: doc["depth"].pop("intrinsics"))
-    spoil(root, "units", lambda doc: doc["depth"].update(unit_m=1.0))
-    cv2.imwrite(str(root / "dermoscopy.png"), np.full((90, 120, 3), 150, np.uint8))
-    (root / "holiday.jpg").write_bytes(b"this is no picture")
-
-    with ClinicStore.open(root / "clinic") as store:
-        user = store.users.create("weber", "Dr Anna Weber", "a long password 1")
-        person = store.patients.create(PatientDraft("Müller", "Jörg"), by=user.id)
-        store.patients.create(PatientDraft("Nováková", "Eva"), by=user.id)
-        session = VisitSession.begin(store, user.id, person.id, default_tracker)
-        session.adopt_stance(session.take_stance(captures["psi"].capture))
-        session.fire(Event.GO_CAPTURE)
-        session.adopt_working(session.take_working(captures["A1"].capture))
-        session.fire(Event.GO_LESIONS)
-        for pixel in list(seen(captures["A1"]).values())[:3]:
-            session.mark(session.snapshot.views["front"], pixel)
-        session.fire(Event.GO_REVIEW)
-        session.close()
-    return World(root, captures)
-
-
-def spoil(root: Path, name: str, change: Callable[[dict[str, Any]], object]) -> None:
-    """A copy of the psi capture folder with another capture.json."""
-    shutil.copytree(root / "psi", root / name)
-    path = root / name / "capture.json"
-    document = json.loads(path.read_text())
-    change(document)
-    path.write_text(json.dumps(document))
-
-
-@dataclass(frozen=True)
-class World:
-    root: Path
-    captures: dict[str, SimulatedCapture]
-
-
-def seen(capture: SimulatedCapture) -> dict[str, tuple[float, float]]:
-    truth = capture.truth
-    return {
-        name: (float(u), float(v))
-        for name, (u, v), visible in zip(truth.mole_ids, truth.mole_pixels, truth.mole_visible, strict=True)
-        if visible and name.startswith("L")
-    }
 
 
 class Hands:
@@ -180,7 +95,7 @@ def open_page(world: World, tmp_path: Path, qapp: QApplication, qtbot: QtBot) ->
         if not contexts:
             store = ClinicStore.open(folder)
             context = AppContext(store, folder, cameras=NoCameras(), tracker_factory=default_tracker)
-            user = store.users.authenticate("weber", "a long password 1")
+            user = store.users.authenticate(USER, PASSWORD)
             assert user is not None
             context.log_in(user)
             contexts.append(context)
@@ -437,7 +352,7 @@ def test_the_demonstration_looks_through_the_simulated_camera_at_once(
     shutil.copytree(world.root / "clinic", tmp_path / "clinic")
     store = ClinicStore.open(tmp_path / "clinic")
     context = AppContext(store, store.folder, tracker_factory=default_tracker, demonstration=True)
-    user = store.users.authenticate("weber", "a long password 1")
+    user = store.users.authenticate(USER, PASSWORD)
     assert user is not None
     context.log_in(user)
     page = VisitPage(context, store.patients.search("Nováková")[0].patient.id)
