@@ -14,6 +14,7 @@ import numpy as np
 
 from app.demo.clinic import FOLLOW_UP_STANCE, sample_lesions
 from app.demo.driver import WORK_TIMEOUT_S, DriverError, WindowDriver
+from app.demo.guide import write_guide_pictures
 from app.demo.places import site_in_words
 from app.demo.scene import DemoCameras
 from app.gui import application, open_clinic, open_window
@@ -78,9 +79,7 @@ def run_unattended(
             shutil.rmtree(clinic.parent, ignore_errors=True)
     table = _write_table(out / "relocation_errors.csv", errors)
     if guide is not None:
-        guide.mkdir(parents=True, exist_ok=True)
-        for name in GUIDE_PICTURES:
-            shutil.copy(pictures / f"{name}.png", guide / f"{name}.png")
+        write_guide_pictures(pictures, out / "report.pdf", guide)
     print(table)
     print(
         f"\nDone in {time.perf_counter() - started:.0f} s. In {out}/:\n"
@@ -91,11 +90,6 @@ def run_unattended(
         flush=True,
     )
     return 0
-
-
-GUIDE_PICTURES = (
-    "login", "patients", "patient", "stance", "capture", "mark", "review", "follow_up", "explain", "compare",
-)  # fmt: skip
 
 
 class Tour:

@@ -201,7 +201,7 @@ class LesionTable(RowTable):
                 Column("No.", 56),
                 Column("Anatomic site"),
                 Column("Status", 148),
-                Column("Last seen", 116),
+                Column("Last seen", 136),
                 Column("Images", 76, number=True),
             ],
             parent,

@@ -276,9 +276,10 @@ class PatientPage(QWidget):
             )
             for v in reversed(self._model.visits)
         ]
+        came = len(rows) != len(self.visits.rows())
         self.visits.set_rows(rows)
         self.visit_stack.setCurrentWidget(self.visits if rows else self.no_visits)
-        if rows and self.visits.selected() is None:
+        if rows and (came or self.visits.selected() is None):
             self.visits.set_selected(rows[0].key)
 
     def _show_lesions(self) -> None:
