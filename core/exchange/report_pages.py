@@ -51,6 +51,8 @@ _FIRST_TOP, _NEXT_TOP, _BOTTOM = 24 * mm, 21 * mm, 19 * mm
 _NO_PADDING = [
     (name, (0, 0), (-1, -1), 0) for name in ("LEFTPADDING", "RIGHTPADDING", "TOPPADDING", "BOTTOMPADDING")
 ]
+# A cell without text draws in the table's font: without this it would be Helvetica, which is not embedded.
+_CELL_FONT = ("FONTNAME", (0, 0), (-1, -1), REGULAR)
 _AT = {"this visit": "this visit", "previous visit": "the previous visit"}
 _OPEN_STATUSES = ("found", "predicted", "ambiguous", "refused")
 
@@ -68,6 +70,7 @@ def build_pdf(store: ClinicStore, report: VisitReport, out: BinaryIO, body_map: 
         creator="GeoDerm",
         lang="en",
         invariant=1,
+        initialFontName=REGULAR,
     )
 
     def frame(top: float) -> Any:
@@ -201,6 +204,7 @@ def _patient_part(report: VisitReport) -> list[Flowable]:
     grid = Table([cells[:3], cells[3:]], colWidths=[width] * 3)
     grid.setStyle(
         [
+            _CELL_FONT,
             *_NO_PADDING,
             ("VALIGN", (0, 0), (-1, -1), "TOP"),
             ("TOPPADDING", (0, 0), (-1, -1), 2.6 * mm),
@@ -210,6 +214,7 @@ def _patient_part(report: VisitReport) -> list[Flowable]:
     card = Table([[words(patient.full_name, "name")], [grid]], colWidths=[CONTENT])
     card.setStyle(
         [
+            _CELL_FONT,
             *_NO_PADDING,
             ("BACKGROUND", (0, 0), (-1, -1), PALE),
             ("LINEBEFORE", (0, 0), (0, -1), 2.2, TEAL),
@@ -253,7 +258,12 @@ def _map_part(report: VisitReport, body_map: bytes | None) -> list[Flowable]:
             captions += [""] * (3 - len(captions))
         table = Table([maps, captions], colWidths=widths)
         table.setStyle(
-            [*_NO_PADDING, ("VALIGN", (0, 0), (-1, -1), "MIDDLE"), ("TOPPADDING", (0, 1), (-1, 1), 3)]
+            [
+                _CELL_FONT,
+                *_NO_PADDING,
+                ("VALIGN", (0, 0), (-1, -1), "MIDDLE"),
+                ("TOPPADDING", (0, 1), (-1, 1), 3),
+            ]
         )
         tables.append(table)
     legend = [_legend(report), Spacer(0, 5 * mm)]
@@ -313,6 +323,7 @@ def _summary_part(report: VisitReport) -> list[Flowable]:
     table = Table(rows, colWidths=fixed, repeatRows=1)
     table.setStyle(
         [
+            _CELL_FONT,
             ("VALIGN", (0, 0), (-1, -1), "TOP"),
             ("LEFTPADDING", (0, 0), (-1, -1), 1.6 * mm),
             ("RIGHTPADDING", (0, 0), (-1, -1), 1.6 * mm),
@@ -374,6 +385,7 @@ def _lesion_block(store: ClinicStore, report: VisitReport, entry: LesionEntry) -
     )
     bar.setStyle(
         [
+            _CELL_FONT,
             *_NO_PADDING,
             ("VALIGN", (0, 0), (-1, -1), "MIDDLE"),
             ("LINEABOVE", (0, 0), (-1, 0), 0.8, TEAL),
@@ -400,7 +412,12 @@ def _fact_table(facts: list[tuple[str, str]]) -> Table:
         colWidths=[label_width, CONTENT - label_width],
     )
     table.setStyle(
-        [*_NO_PADDING, ("VALIGN", (0, 0), (-1, -1), "TOP"), ("BOTTOMPADDING", (0, 0), (-1, -1), 1.2)]
+        [
+            _CELL_FONT,
+            *_NO_PADDING,
+            ("VALIGN", (0, 0), (-1, -1), "TOP"),
+            ("BOTTOMPADDING", (0, 0), (-1, -1), 1.2),
+        ]
     )
     return table
 
