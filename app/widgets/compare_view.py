@@ -128,7 +128,8 @@ class CompareView(QWidget):
         if mode == "flicker":
             self._shown_later = False
             self.left.set_ghost_opacity(0.0)
-            self._timer.start()
+            if self.isVisible():
+                self._timer.start()
 
     @Slot(int)
     def _on_slider(self, value: int) -> None:

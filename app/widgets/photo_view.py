@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -188,11 +188,12 @@ class PhotoView(QGraphicsView):
     def _scale(self) -> float:
         return self.transform().m11()
 
-    def _fit_scale(self) -> float:
+    def _fit_scale(self, viewport: QSize | None = None) -> float:
         width, height = self.image_size
         if not width:
             return 1.0
-        return max(min((self.viewport().width() - 2) / width, (self.viewport().height() - 2) / height), 1e-6)
+        size = viewport or self.viewport().size()
+        return max(min((size.width() - 2) / width, (size.height() - 2) / height), 1e-6)
 
     def fit(self) -> None:
         """Show the whole picture."""
@@ -206,8 +207,8 @@ class PhotoView(QGraphicsView):
         if not self._quiet:
             self.view_changed.emit()
 
-    def _center(self) -> QPointF:
-        size = self.viewport().size()
+    def _center(self, viewport: QSize | None = None) -> QPointF:
+        size = viewport or self.viewport().size()
         a = self.mapToScene(QPoint(0, 0))
         return a + QPointF(size.width() / 2, size.height() / 2) / self._scale()
 
@@ -247,9 +248,13 @@ class PhotoView(QGraphicsView):
 
     def view_state(self) -> ViewState:
         """Zoom and centre, relative to the picture."""
+        return self._state_in(self.viewport().size())
+
+    def _state_in(self, viewport: QSize) -> ViewState:
         width, height = self.image_size
-        c = self._center()
-        return ViewState(self._scale() / self._fit_scale(), c.x() / max(width, 1), c.y() / max(height, 1))
+        c = self._center(viewport)
+        zoom = self._scale() / self._fit_scale(viewport)
+        return ViewState(zoom, c.x() / max(width, 1), c.y() / max(height, 1))
 
     def set_view_state(self, state: ViewState) -> None:
         """Take over zoom and centre of another view, without emitting ``view_changed``."""
@@ -260,10 +265,13 @@ class PhotoView(QGraphicsView):
         self._quiet = False
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102
-        state = self.view_state() if not self._fitted else None
+        known = not self._fitted and not event.oldSize().isEmpty()
+        kept = self._state_in(event.oldSize()) if known else None
         super().resizeEvent(event)
-        if state is None:
+        if self._fitted:
             self.fit()
+        elif kept is not None:
+            self.set_view_state(kept)
 
     def drawForeground(self, painter: QPainter, rect: QRectF | QRectF) -> None:  # noqa: D102
         super().drawForeground(painter, rect)
