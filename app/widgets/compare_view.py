@@ -1,11 +1,9 @@
-"""Two photos of the same thing, of two days: side by side with one zoom, laid over each other, or flickering.
+"""Two pictures of the same thing: side by side with one zoom, laid over each other, or flickering.
 
-Public API of `CompareView`
----------------------------
-``set_pair(left, right, left_title, right_title, left_mm_per_pixel=None, right_mm_per_pixel=None)``
-``set_mode("side" | "overlay" | "flicker")``, ``mode()``
-``left``, ``right``  the two `PhotoView`; buttons ``compare_side``, ``compare_overlay``, ``compare_flicker``, ``compare_fit``,
-slider ``compare_opacity``. Where both scales are known, equal lengths look equal.
+Public API
+----------
+``CompareView()``: ``set_pictures(left, right, left_caption, right_caption)`` (QImage, ndarray or None),
+    ``set_mode("side" | "overlay" | "flicker")``, ``mode``, ``left``, ``right`` (`PhotoView`).
 """
 
 from __future__ import annotations
@@ -13,26 +11,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QSize, Qt, QTimer, Slot
-from PySide6.QtGui import QHideEvent, QImage
-from PySide6.QtWidgets import (
-    QButtonGroup,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QSlider,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtGui import QHideEvent, QImage, QShowEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSlider, QVBoxLayout, QWidget
 
 from app.theme import icon, palette, set_state, style_class
-from app.widgets.photo_view import PhotoView, ViewState
-
-MODES = (("side", "Side by side", "compare"), ("overlay", "Overlay", "layers"), ("flicker", "Flicker", "flicker"))
-FLICKER_MS = 600
+from app.widgets.photo_view import PhotoView
 
 Picture = QImage | NDArray[np.uint8] | None
+
+MODES = (
+    ("side", "Side by side", "compare"),
+    ("overlay", "Overlay", "layers"),
+    ("flicker", "Flicker", "flicker"),
+)
+FLICKER_MS = 600
 
 
 class CompareView(QWidget):
@@ -40,134 +32,104 @@ class CompareView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.left, self.right = PhotoView(), PhotoView()
-        self.left.setObjectName("compare_left")
-        self.right.setObjectName("compare_right")
-        self._titles = QLabel(), QLabel()
-        self._scales: tuple[float | None, float | None] = (None, None)
+        self.setObjectName("compare_view")
+        self.mode = "side"
         self._pictures: tuple[Picture, Picture] = (None, None)
-        self._mode = "side"
-        self._columns: list[QWidget] = []
-        row = QHBoxLayout()
-        row.setSpacing(16)
-        for view, title in zip((self.left, self.right), self._titles, strict=True):
-            style_class(title, "strong")
-            column = QWidget()
-            box = QVBoxLayout(column)
-            box.setContentsMargins(0, 0, 0, 0)
-            box.setSpacing(8)
-            box.addWidget(title)
-            frame = QFrame()
-            style_class(frame, "photo")
-            inner = QVBoxLayout(frame)
-            inner.setContentsMargins(1, 1, 1, 1)
-            inner.addWidget(view)
-            box.addWidget(frame, 1)
-            self._columns.append(column)
-            row.addWidget(column, 1)
-        self.left.view_changed.connect(self._follow_left)
-        self.right.view_changed.connect(self._follow_right)
+        self._following = False
+        self.left, self._left_frame, self._left_caption = self._pane("compare_left")
+        self.right, self._right_frame, self._right_caption = self._pane("compare_right")
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setObjectName("compare_slider")
+        self.slider.setRange(0, 100)
+        self.slider.setValue(50)
+        self.slider.setToolTip("From the earlier to the later picture")
+        self.slider.valueChanged.connect(self._on_slider)
         self._timer = QTimer(self, interval=FLICKER_MS)
         self._timer.timeout.connect(self._flick)
-        self._flick_on = False
-        column_layout = QVBoxLayout(self)
-        column_layout.setContentsMargins(0, 0, 0, 0)
-        column_layout.setSpacing(12)
-        column_layout.addLayout(row, 1)
-        column_layout.addLayout(self._controls())
+        self._buttons = {key: self._button(key, text, symbol) for key, text, symbol in MODES}
+        self._build()
+        self.left.view_changed.connect(lambda: self._follow(self.left, self.right))
+        self.right.view_changed.connect(lambda: self._follow(self.right, self.left))
         self.set_mode("side")
 
-    def _controls(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(0)
-        self._group = QButtonGroup(self)
-        self._buttons: dict[str, QPushButton] = {}
-        for number, (mode, text, symbol) in enumerate(MODES):
-            button = QPushButton(icon(symbol, palette.SECONDARY), text)
-            button.setObjectName(f"compare_{mode}")
-            button.setCheckable(True)
-            button.setIconSize(QSize(18, 18))
-            style_class(button, "segment")
-            set_state(button, "first", "true" if number == 0 else "false")
-            set_state(button, "last", "true" if number == len(MODES) - 1 else "false")
-            button.clicked.connect(lambda _=False, m=mode: self.set_mode(m))
-            self._group.addButton(button)
-            self._buttons[mode] = button
-            row.addWidget(button)
-        row.addSpacing(16)
-        self._before = QLabel("Earlier")
-        self._after = QLabel("Later")
-        self._slider = QSlider(Qt.Orientation.Horizontal)
-        self._slider.setObjectName("compare_opacity")
-        self._slider.setRange(0, 100)
-        self._slider.setValue(50)
-        self._slider.setFixedWidth(240)
-        self._slider.valueChanged.connect(self._on_slider)
-        for label in (self._before, self._after):
-            style_class(label, "secondary")
-        for widget in (self._before, self._slider, self._after):
-            row.addWidget(widget)
-            row.addSpacing(8)
-        row.addStretch(1)
-        for name, symbol, tip, action in (
-            ("compare_zoom_in", "zoom-in", "Zoom in (+)", lambda: self.left.zoom_by(1.25)),
-            ("compare_zoom_out", "zoom-out", "Zoom out (-)", lambda: self.left.zoom_by(0.8)),
-            ("compare_fit", "fit", "Show the whole pictures (0)", self.fit),
-        ):
-            tool = QToolButton()
-            tool.setObjectName(name)
-            tool.setIcon(icon(symbol, palette.SECONDARY))
-            tool.setIconSize(QSize(20, 20))
-            tool.setToolTip(tip)
-            style_class(tool, "icon")
-            tool.clicked.connect(lambda _=False, a=action: a())
-            row.addWidget(tool)
-        return row
+    def _pane(self, name: str) -> tuple[PhotoView, QFrame, QLabel]:
+        view = PhotoView()
+        view.setObjectName(name)
+        caption = QLabel()
+        caption.setObjectName(f"{name}_caption")
+        style_class(caption, "strong")
+        photo = QFrame()
+        style_class(photo, "photo")
+        inside = QVBoxLayout(photo)
+        inside.setContentsMargins(1, 1, 1, 1)
+        inside.addWidget(view)
+        frame = QFrame()
+        column = QVBoxLayout(frame)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(8)
+        column.addWidget(caption)
+        column.addWidget(photo, 1)
+        return view, frame, caption
 
-    def set_pair(
-        self,
-        left: Picture,
-        right: Picture,
-        left_title: str = "",
-        right_title: str = "",
-        left_mm_per_pixel: float | None = None,
-        right_mm_per_pixel: float | None = None,
-    ) -> None:
-        """Show two pictures; the scales are known or None."""
+    def _button(self, key: str, text: str, symbol: str) -> QPushButton:
+        button = QPushButton(icon(symbol, palette.TEXT), f" {text}")
+        button.setObjectName(f"compare_{key}")
+        button.setCheckable(True)
+        button.setIconSize(QSize(18, 18))
+        style_class(button, "segment")
+        set_state(button, "first", "true" if key == MODES[0][0] else "false")
+        set_state(button, "last", "true" if key == MODES[-1][0] else "false")
+        button.clicked.connect(lambda _=False: self.set_mode(key))
+        return button
+
+    def _build(self) -> None:
+        tools = QHBoxLayout()
+        tools.setSpacing(0)
+        for button in self._buttons.values():
+            tools.addWidget(button)
+        tools.addSpacing(24)
+        tools.addWidget(self.slider, 1)
+        tools.addStretch(1)
+        panes = QHBoxLayout()
+        panes.setSpacing(16)
+        panes.addWidget(self._left_frame, 1)
+        panes.addWidget(self._right_frame, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(12)
+        column.addLayout(tools)
+        column.addLayout(panes, 1)
+
+    def set_pictures(self, left: Picture, right: Picture, left_caption: str, right_caption: str) -> None:
+        """Show a pair, the earlier picture left."""
         self._pictures = (left, right)
-        self._scales = (left_mm_per_pixel, right_mm_per_pixel)
-        for view, picture, scale in zip((self.left, self.right), self._pictures, self._scales, strict=True):
-            view.set_image(picture)
-            view.set_scale_mm(scale)
-            view.fit()
-        for label, text in zip(self._titles, (left_title, right_title), strict=True):
-            label.setText(text)
-        self.set_mode(self._mode)
-
-    def mode(self) -> str:
-        """How the pictures are shown."""
-        return self._mode
+        self._left_caption.setText(left_caption)
+        self._right_caption.setText(right_caption)
+        self.left.set_image(left)
+        self.right.set_image(right)
+        self.set_mode(self.mode if left is not None and right is not None else "side")
+        for key, button in self._buttons.items():
+            button.setEnabled(key == "side" or (left is not None and right is not None))
+        QTimer.singleShot(0, self.left.fit)
+        QTimer.singleShot(0, self.right.fit)
 
     def set_mode(self, mode: str) -> None:
-        """Show them side by side, laid over each other, or in turn."""
-        self._mode = mode
-        self._buttons[mode].setChecked(True)
-        side = mode == "side"
-        self._columns[1].setVisible(side)
-        for widget in (self._before, self._slider, self._after):
-            widget.setVisible(mode == "overlay")
+        """Change how the pair is shown."""
+        self.mode = mode
+        for key, button in self._buttons.items():
+            button.setChecked(key == mode)
+        self._right_frame.setVisible(mode == "side")
+        self.slider.setVisible(mode == "overlay")
         self._timer.stop()
-        self.left.set_ghost_image(None if side else self._pictures[1], self._slider.value() / 100)
+        if mode == "side":
+            self.left.set_ghost_image(None)
+            return
+        self.left.set_ghost_image(self._pictures[1], self.slider.value() / 100)
         if mode == "flicker":
-            self._flick_on = False
-            self._flick()
-            self._timer.start()
-
-    @Slot()
-    def fit(self) -> None:
-        """Show both whole pictures."""
-        self.left.fit()
-        self.right.fit()
+            self._shown_later = False
+            self.left.set_ghost_opacity(0.0)
+            if self.isVisible():
+                self._timer.start()
 
     @Slot(int)
     def _on_slider(self, value: int) -> None:
@@ -175,25 +137,19 @@ class CompareView(QWidget):
 
     @Slot()
     def _flick(self) -> None:
-        self._flick_on = not self._flick_on
-        self.left.set_ghost_opacity(1.0 if self._flick_on else 0.0)
+        self._shown_later = not self._shown_later
+        self.left.set_ghost_opacity(1.0 if self._shown_later else 0.0)
 
-    @Slot()
-    def _follow_left(self) -> None:
-        self.right.set_view_state(self._matched(self.left, self.right, 0))
+    def _follow(self, leader: PhotoView, follower: PhotoView) -> None:
+        if not self._following and self.mode == "side":
+            self._following = True
+            follower.set_view_state(leader.view_state())
+            self._following = False
 
-    @Slot()
-    def _follow_right(self) -> None:
-        self.left.set_view_state(self._matched(self.right, self.left, 1))
-
-    def _matched(self, source: PhotoView, target: PhotoView, index: int) -> ViewState:
-        """The view of ``target`` that shows what ``source`` shows; equal millimetres where both are known."""
-        state = source.view_state()
-        mine, other = self._scales[index], self._scales[1 - index]
-        if not mine or not other:
-            return state
-        ratio = target.fitted_scale() / source.fitted_scale()
-        return ViewState(state.zoom * (other / mine) / ratio, state.x, state.y)
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: D102
+        super().showEvent(event)
+        if self.mode == "flicker":
+            self._timer.start()
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102
         self._timer.stop()

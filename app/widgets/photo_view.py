@@ -188,7 +188,7 @@ class PhotoView(QGraphicsView):
     def _scale(self) -> float:
         return self.transform().m11()
 
-    def fitted_scale(self, viewport: QSize | None = None) -> float:
+    def _fit_scale(self, viewport: QSize | None = None) -> float:
         width, height = self.image_size
         if not width:
             return 1.0
@@ -199,7 +199,7 @@ class PhotoView(QGraphicsView):
         """Show the whole picture."""
         width, height = self.image_size
         self._fitted = True
-        self._set_view(self.fitted_scale(), QPointF(width / 2, height / 2))
+        self._set_view(self._fit_scale(), QPointF(width / 2, height / 2))
 
     def _set_view(self, scale: float, center: QPointF) -> None:
         self.setTransform(QTransform.fromScale(scale, scale))
@@ -216,7 +216,7 @@ class PhotoView(QGraphicsView):
         """Zoom; ``around`` is a viewport position that stays where it is (default: the middle)."""
         if not self.image_size[0]:
             return
-        fit = self.fitted_scale()
+        fit = self._fit_scale()
         old = self._scale()
         new = min(max(old * factor, fit * _MIN_ZOOM), fit * _MAX_ZOOM)
         middle = QPointF(self.viewport().width() / 2, self.viewport().height() / 2)
@@ -228,7 +228,7 @@ class PhotoView(QGraphicsView):
     def center_on(self, x: float, y: float, zoom: float | None = None) -> None:
         """Bring an image pixel to the middle; ``zoom`` is relative to the fitted picture."""
         self._fitted = False
-        self._set_view(self.fitted_scale() * zoom if zoom else self._scale(), QPointF(x, y))
+        self._set_view(self._fit_scale() * zoom if zoom else self._scale(), QPointF(x, y))
 
     def center_on_marker(self, marker_id: str, zoom: float | None = None) -> None:
         """Bring a marker to the middle."""
@@ -253,7 +253,7 @@ class PhotoView(QGraphicsView):
     def _state_in(self, viewport: QSize) -> ViewState:
         width, height = self.image_size
         c = self._center(viewport)
-        zoom = self._scale() / self.fitted_scale(viewport)
+        zoom = self._scale() / self._fit_scale(viewport)
         return ViewState(zoom, c.x() / max(width, 1), c.y() / max(height, 1))
 
     def set_view_state(self, state: ViewState) -> None:
@@ -261,7 +261,7 @@ class PhotoView(QGraphicsView):
         width, height = self.image_size
         self._quiet = True
         self._fitted = False
-        self._set_view(self.fitted_scale() * state.zoom, QPointF(state.x * width, state.y * height))
+        self._set_view(self._fit_scale() * state.zoom, QPointF(state.x * width, state.y * height))
         self._quiet = False
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102
@@ -273,7 +273,7 @@ class PhotoView(QGraphicsView):
         elif kept is not None:
             self.set_view_state(kept)
 
-    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:  # noqa: D102
+    def drawForeground(self, painter: QPainter, rect: QRectF | QRectF) -> None:  # noqa: D102
         super().drawForeground(painter, rect)
         if self._mm_per_pixel and self.image_size[0]:
             painter.save()
