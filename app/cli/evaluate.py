@@ -28,16 +28,19 @@ def _group() -> None:
 
 
 def ladder(
-    pairs: int = typer.Option(0, min=0, help="Pairs of captures; 0 for all of the test split."),
+    pairs: int = typer.Option(0, min=0, help="Pairs of captures; 0 for all of the split."),
+    split: str = typer.Option("test", help="test, or tuning: the bodies that parameters were chosen on."),
     frames: int = typer.Option(30, min=1, max=300, help="Depth frames of each capture."),
     joints: str = typer.Option("tracked", help="tracked, true or both; true ones are labelled so."),
     methods: str = typer.Option("", help="Methods separated by commas; the whole ladder by default."),
-    delta_m: float = typer.Option(0.0, "--delta-m", help="Half width of a voting band in metres."),
+    delta_m: float | None = typer.Option(
+        None, "--delta-m", help="Half width of a voting band in metres. Default: 0.03 (docs/method.md)."
+    ),
     seed: int = typer.Option(0, min=0, help="Seed of methods and bootstrap."),
     out: Path | None = typer.Option(None, "--out", help="JSON file to write as well."),
 ) -> None:
     """Print the accuracy ladder: every method on the same simulated pairs of visits."""
-    from app.cli.simulated_cases import TEST_PAIRS, Joints, SimulatedCases
+    from app.cli.simulated_cases import TEST_PAIRS, TUNING_PAIRS, Joints, SimulatedCases
     from core.evaluation import BASELINES, LADDER, run_ladder
     from core.relocation import DEFAULT_DELTA_M, RELOCATION_METHODS, RelocationOptions, write_json
 
@@ -53,10 +56,13 @@ def ladder(
     for name in chosen:
         if name not in known:
             raise InputError(f"There is no method '{name}'.", f"Choose from: {', '.join(known)}.")
+    splits = {"test": TEST_PAIRS, "tuning": TUNING_PAIRS}
+    if split not in splits:
+        raise InputError(f"There is no split '{split}'.", f"Choose one of: {', '.join(splits)}.")
     if out is not None and not out.parent.is_dir():
         raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
-    options = RelocationOptions(delta_m=delta_m if delta_m != 0.0 else DEFAULT_DELTA_M)
-    source = SimulatedCases(TEST_PAIRS[: pairs or None], frames=frames, joints=kinds[joints])
+    options = RelocationOptions(delta_m=DEFAULT_DELTA_M if delta_m is None else delta_m)
+    source = SimulatedCases(splits[split][: pairs or None], frames=frames, joints=kinds[joints])
     rows = run_ladder(source, methods=chosen, options=options, seed=seed, progress=_tell)
     typer.echo(ladder_table(rows))
     if out is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from core.errors import InputError, WorkError
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
     from core.capture import RgbdCapture
-    from core.relocation import LesionQuery
+    from core.relocation import LesionQuery, RelocationOptions, RelocationResult
 
 
 def register(app: typer.Typer) -> None:
@@ -30,7 +31,9 @@ def relocate_command(
     method: str = typer.Option("", "--method", help="Relocation method (default: the best shipped)."),
     no_appearance: bool = typer.Option(False, "--no-appearance", help="Geometry alone: never match colour."),
     seed: int = typer.Option(0, "--seed", min=0, help="Seed of every random draw."),
-    delta_m: float = typer.Option(0.0, "--delta-m", help="Half width of a voting band in metres."),
+    delta_m: float | None = typer.Option(
+        None, "--delta-m", help="Half width of a voting band in metres. Default: 0.03 (docs/method.md)."
+    ),
     explain: Path | None = typer.Option(
         None, "--explain", help="Folder for pictures explaining every lesion."
     ),
@@ -40,6 +43,7 @@ def relocate_command(
     from core.relocation import (
         DEFAULT_DELTA_M,
         DEFAULT_METHOD,
+        RelocatedLesion,
         RelocationOptions,
         read_lesions,
         relocate_visit,
@@ -50,7 +54,7 @@ def relocate_command(
     start = time.perf_counter()
     method = method or DEFAULT_METHOD
     relocation_method(method)
-    options = RelocationOptions(delta_m=delta_m if delta_m != 0.0 else DEFAULT_DELTA_M)
+    options = RelocationOptions(delta_m=DEFAULT_DELTA_M if delta_m is None else delta_m)
     queries = read_lesions(lesions)
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
@@ -61,17 +65,25 @@ def relocate_command(
     queries = tuple(query_as_read(query, dict(first_visit), first_mirrored) for query in queries)
     read = time.perf_counter()
     wanted = {q.capture for q in queries if q.capture is not None} or {name for name, _ in first_visit}
-    analysed1, _ = _analyse([(n, c) for n, c in first_visit if n in wanted] if queries else [])
-    analysed2, warnings = _analyse(followup_visit if queries else [])
+    analysed1, unusable = _analyse([(n, c) for n, c in first_visit if n in wanted] if queries else [])
+    analysed2, bodiless = _analyse(followup_visit if queries else [])
+    warnings = [f"{name}: {reason}" for name, reason in {**unusable, **bodiless}.items()]
     analysed = time.perf_counter()
     result = relocate_visit(
         analysed1,
         analysed2,
-        queries,
+        [q for q in queries if q.capture not in unusable],
         method=method,
         appearance=not no_appearance,
         seed=seed,
         options=options,
+    )
+    answers = {lesion.id: lesion for lesion in result.lesions}
+    result = replace(
+        result,
+        lesions=tuple(
+            answers.get(q.id) or RelocatedLesion(q.id, "refused", unusable[str(q.capture)]) for q in queries
+        ),
     )
     document = result.to_json()
     for entry in document["lesions"] if isinstance(document["lesions"], list) else []:
@@ -89,7 +101,7 @@ def relocate_command(
     }
     write_json(out, document)
     if explain is not None:
-        _explain(explain, analysed1, analysed2, queries, options)
+        _explain(explain, analysed1, analysed2, queries, result, options)
 
 
 def _check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[str, RgbdCapture]) -> None:
@@ -118,23 +130,23 @@ def _check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[s
             )
 
 
-def _analyse(captures: list[tuple[str, RgbdCapture]]) -> tuple[dict[str, AnalysedCapture], list[str]]:
-    """Analysed captures by name. In a visit of several, one that shows no body is a warning."""
+def _analyse(captures: list[tuple[str, RgbdCapture]]) -> tuple[dict[str, AnalysedCapture], dict[str, str]]:
+    """Analysed captures by name; in a visit of several, those that show no body, with the reason."""
     from core.anchors import analyse_capture
     from devices.trackers import default_tracker
 
     out: dict[str, AnalysedCapture] = {}
-    warnings: list[str] = []
+    unusable: dict[str, str] = {}
     for name, capture in captures:
         try:
             out[name] = analyse_capture(capture, default_tracker())
         except WorkError as error:
             if len(captures) == 1:
                 raise
-            warnings.append(f"{name}: {error.message}")
+            unusable[name] = error.message
     if captures and not out:
         raise WorkError("No body was found in any capture.", "Capture again with the whole body in view.")
-    return out, warnings
+    return out, unusable
 
 
 def _explain(
@@ -142,17 +154,23 @@ def _explain(
     first: dict[str, AnalysedCapture],
     followup: dict[str, AnalysedCapture],
     queries: tuple[LesionQuery, ...],
-    options: object,
+    result: RelocationResult,
+    options: RelocationOptions,
 ) -> None:
-    from core.relocation import RelocationOptions
-    from core.relocation.explain import explain_lesion
+    """Pictures of every lesion against the capture its answer lies in, with the distances of the method."""
+    from core.relocation.explain import KINDS, explain_lesion
     from core.relocation.explain_files import write_explanation
 
-    assert isinstance(options, RelocationOptions)
-    for query in queries:
-        source = first[query.capture if query.capture is not None else next(iter(first))]
-        for name, target in followup.items():
-            explanation = explain_lesion(source, target, query, options=options)
-            if explanation is not None:
-                prefix = query.id if len(followup) == 1 else f"{query.id}-{name}"
-                write_explanation(explanation, source, target, folder, prefix)
+    for query, lesion in zip(queries, result.lesions, strict=True):
+        source = first.get(query.capture if query.capture is not None else next(iter(first)))
+        name = lesion.capture if lesion.capture is not None else next(iter(followup))
+        if source is None:
+            continue
+        target = followup[name]
+        method = result.method if result.method in KINDS else "trilateration"
+        explanation = explain_lesion(
+            source, target, query, method=method, options=options, answer_m=lesion.point_m
+        )
+        if explanation is not None:
+            prefix = query.id if len(followup) == 1 else f"{query.id}-{name}"
+            write_explanation(explanation, source, target, folder, prefix)
