@@ -13,10 +13,17 @@ from PySide6.QtWidgets import QApplication
 
 from app.logs import start_logging
 from app.paths import default_data_dir
+from app.windows.start_window import StartWindow
+from core.errors import GeodermError
 
 if TYPE_CHECKING:
     from app.context import AppContext, CameraSource
     from app.windows.main_window import MainWindow
+    from core.records import ClinicStore
+
+
+_CALM_MS = 200
+"""From the first paint to the loading of heavy libraries: what was painted reaches the screen first."""
 
 
 def application() -> QApplication:
@@ -48,8 +55,17 @@ def open_window(context: AppContext) -> MainWindow:
     window = MainWindow(context)
     install_excepthook(window.tell_failure)
     context.tasks.unhandled.connect(window.tell_failure)
-    QTimer.singleShot(300, _load_heavy_things)
+    window.ready.connect(lambda: QTimer.singleShot(_CALM_MS, _load_heavy_things))
     return window
+
+
+def _tell_start_failure(app: QApplication, error: GeodermError) -> None:
+    """Show why there is no main window, until the user closes the message."""
+    from app.windows.start_failure import StartFailure
+
+    window = StartFailure(error)
+    window.show()
+    app.exec()
 
 
 def _load_heavy_things() -> None:
@@ -75,6 +91,8 @@ def run_gui(
 ) -> int:
     """Run the application until its window is closed; return the exit code.
 
+    A start window is painted at once; the main window takes its place when the records are open.
+
     Parameters
     ----------
     data_dir : Path, optional
@@ -82,17 +100,49 @@ def run_gui(
     cameras : CameraSource, optional
     demonstration : bool
     when_open : callable, optional
-        Called with the window once it is shown.
+        Called with the main window once it is shown.
+
+    Raises
+    ------
+    GeodermError
+        If the records cannot be opened: after the user has read it in the start window and closed that.
     """
     start_logging()
     app = application()
-    context = open_clinic(data_dir or default_data_dir(), cameras=cameras, demonstration=demonstration)
-    try:
+    start = StartWindow(lambda: _open_records(data_dir or default_data_dir()))
+    opened: list[tuple[AppContext, MainWindow]] = []
+
+    def show_clinic(store: ClinicStore) -> None:
+        from app.context import AppContext
+
+        context = AppContext(
+            store, data_dir or default_data_dir(), cameras=cameras, demonstration=demonstration
+        )
         window = open_window(context)
+        opened.append((context, window))
+        window.setGeometry(start.geometry())
         window.show()
+        start.close()
         if when_open is not None:
             QTimer.singleShot(0, lambda: when_open(window))
+
+    start.opened.connect(show_clinic)
+    start.begin()
+    try:
         code = app.exec()
     finally:
-        context.close()
+        for context, _ in opened:
+            context.close()
+        unused = start.abandon()
+        if unused is not None:
+            unused.close()
+        start.deleteLater()
+    if start.error is not None:
+        raise start.error
     return code
+
+
+def _open_records(data_dir: Path) -> ClinicStore:
+    from core.records import ClinicStore
+
+    return ClinicStore.open(data_dir)

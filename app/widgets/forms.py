@@ -38,6 +38,7 @@ class Field(QWidget):
         column.addWidget(caption)
         column.addWidget(editor)
         column.addWidget(self._below)
+        column.addStretch(1)
         if isinstance(editor, QLineEdit):
             editor.textEdited.connect(self._on_edited)
 
