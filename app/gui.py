@@ -14,7 +14,6 @@ from PySide6.QtWidgets import QApplication
 from app.logs import start_logging
 from app.paths import default_data_dir
 from app.windows.start_window import StartWindow
-from core.errors import GeodermError
 
 if TYPE_CHECKING:
     from app.context import AppContext, CameraSource
@@ -57,15 +56,6 @@ def open_window(context: AppContext) -> MainWindow:
     context.tasks.unhandled.connect(window.tell_failure)
     window.ready.connect(lambda: QTimer.singleShot(_CALM_MS, _load_heavy_things))
     return window
-
-
-def _tell_start_failure(app: QApplication, error: GeodermError) -> None:
-    """Show why there is no main window, until the user closes the message."""
-    from app.windows.start_failure import StartFailure
-
-    window = StartFailure(error)
-    window.show()
-    app.exec()
 
 
 def _load_heavy_things() -> None:

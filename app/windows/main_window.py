@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Signal, Slot
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtCore import QSize, QTimer, Signal, Slot
+from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QShortcut
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
@@ -38,7 +38,7 @@ class MainWindow(QMainWindow):
     Parameters
     ----------
     context : AppContext
-        Closed when the window is.
+        To be closed after the window is.
 
     Signals
     -------
@@ -74,6 +74,8 @@ class MainWindow(QMainWindow):
             QKeySequence("Ctrl+Shift+P"), self, lambda: context.set_privacy_mode(not context.privacy_mode)
         )
         QShortcut(QKeySequence("Ctrl+F"), self, self.show_patients)
+        context.records_changed.connect(self._show_title)
+        self._painted = False
         self._show_privacy()
         self._show_page(self.login)
 
@@ -136,6 +138,7 @@ class MainWindow(QMainWindow):
         self.patients_button.setChecked(page is self._patients)
         self._show_title()
 
+    @Slot()
     def _show_title(self) -> None:
         """Name the window; no patient's name in it while names are hidden."""
         parts = [NAME]
@@ -188,6 +191,8 @@ class MainWindow(QMainWindow):
         from app.windows.patient_page import PatientPage
         from app.windows.visit.page import VisitPage
 
+        if self._visit is not None:  # a second click before the first has changed the page
+            return
         assert isinstance(self._patient, PatientPage)
         patient_id = self._patient.patient_id
         assert patient_id is not None
@@ -234,6 +239,12 @@ class MainWindow(QMainWindow):
     def tell_failure(self, failure: TaskFailure) -> None:
         """Tell of an error that no page shows."""
         tell(self, failure.message, failure.advice)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
+        super().paintEvent(event)
+        if not self._painted:
+            self._painted = True
+            QTimer.singleShot(0, self.ready.emit)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102
         self._leave_visit()

@@ -22,7 +22,7 @@ CENTER = np.array([0.05, 0.1, 2.4])
 HALF = np.array([0.25, 0.8, 0.15])
 
 
-def body(rows: int = 160, columns: int = 160) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def body(rows: int = 90, columns: int = 90) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """A closed ellipsoid of the size of a body, before the camera."""
     polar = np.linspace(0.02, np.pi - 0.02, rows)
     around = np.linspace(0, 2 * np.pi, columns, endpoint=False)
@@ -243,6 +243,7 @@ class Renders:
 
 
 def test_while_dragging_every_painted_frame_is_rendered_once(view: BodyView) -> None:
+    view.set_surface(*body(150, 140))
     QTest.qWait(100)
     paints: list[float] = []
     canvas(view).frameSwapped.connect(lambda: paints.append(time.monotonic()))  # type: ignore[attr-defined]
@@ -278,7 +279,9 @@ def test_while_it_turns_a_light_mesh_is_shown_and_then_the_full_one(view: BodyVi
             if a.GetVisibility()
         )
 
-    full = len(body()[1])
+    vertices, faces = body(150, 140)
+    view.set_surface(vertices, faces)
+    full = len(faces)
     assert triangles() == full
     QTest.mousePress(canvas(view), LEFT, pos=QPoint(350, 300))
     QTest.mouseMove(canvas(view), QPoint(380, 300))

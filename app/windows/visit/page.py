@@ -218,24 +218,35 @@ class VisitPage(QWidget):
         *,
         stopped: Callable[[], None] | None = None,
     ) -> None:
-        """Do long work behind the progress overlay; the records are read again if it is stopped."""
+        """Do long work behind the progress overlay; the records are read again if it is stopped.
+
+        What ends after the page was left is dropped, as if it had been cancelled in time.
+        """
         self.banner.clear()
         task = self.context.tasks.start(title, work)
 
+        def finished(result: Any) -> None:
+            if not self._left:
+                self.attempt(lambda: done(result))
+
         def failed(failure: TaskFailure) -> None:
+            if self._left:
+                return
             self.session.reload()
             if stopped is not None:
                 stopped()
             self.banner.show_failure(failure)
 
         def cancelled() -> None:
+            if self._left:
+                return
             self.session.reload()
             if stopped is not None:
                 stopped()
             else:
                 self.banner.show_info("Cancelled. Nothing was changed.")
 
-        task.finished.connect(lambda result: self.attempt(lambda: done(result)))
+        task.finished.connect(finished)
         task.failed.connect(failed)
         task.cancelled.connect(cancelled)
         self.overlay.attach(task)
@@ -248,7 +259,8 @@ class VisitPage(QWidget):
             self.banner.show_warning(refusal.message, refusal.advice)
         except GeodermError as error:
             self.banner.show_error(error.message, error.advice)
-        self.session.reload()
+        if not self._left:
+            self.session.reload()
         return None
 
     def show_dermoscopy(self, lesion_id: int | None, image_id: int) -> None:

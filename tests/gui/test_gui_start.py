@@ -1,0 +1,167 @@
+"""The start of the application as a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.records import ClinicStore
+
+ROOT = Path(__file__).resolve().parents[2]
+
+START = """
+import json, sys
+from pathlib import Path
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+from app.gui import application, run_gui
+
+HEAVY = {heavy}
+told = {{"heavy": {{}}}}
+
+def then(window):
+{then}
+
+class Watch(QObject):
+    def eventFilter(self, watched, event):
+        if event.type() == QEvent.Type.Paint and isinstance(watched, QWidget):
+            window = watched.window()
+            if window.objectName() not in told["heavy"]:
+                told["heavy"][window.objectName()] = sorted(set(HEAVY) & set(sys.modules))
+                if window.objectName() == {first}:
+                    QTimer.singleShot(0, lambda: then(window))
+        return False
+
+watch = Watch()
+application().installEventFilter(watch)
+try:
+    code = run_gui(Path(sys.argv[1]))
+finally:
+    Path(sys.argv[2]).write_text(json.dumps(told))
+sys.exit(code)
+"""
+HEAVY = ("pyvista", "pyvistaqt", "vtkmodules", "open3d", "mediapipe", "numba", "scipy", "pydicom")
+Told = dict[str, Any]
+
+
+def start(
+    tmp_path: Path, clinic: Path, then: str, *, first: str = "main_window"
+) -> tuple[subprocess.CompletedProcess[str], Told]:
+    """Run the application until ``then`` ends it; it is given the window ``first`` once that is painted."""
+    out = tmp_path / "told.json"
+    body = "\n".join(f"    {line}" for line in then.strip().splitlines())
+    done = python(tmp_path, START.format(heavy=HEAVY, then=body, first=repr(first)), str(clinic), str(out))
+    return done, json.loads(out.read_text()) if out.exists() else {}
+
+
+def python(tmp_path: Path, script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments],
+        env={**os.environ, "GEODERM_LOG_DIR": str(tmp_path / "log"), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_the_window_is_painted_before_anything_heavy_is_loaded(tmp_path: Path) -> None:
+    done, told = start(tmp_path, tmp_path / "clinic", "window.close()")
+    assert done.returncode == 0, done.stderr
+    assert told["heavy"] == {"start_window": [], "main_window": []}
+    assert not done.stderr
+
+
+def test_heavy_libraries_are_loaded_once_the_window_stands(tmp_path: Path) -> None:
+    done, _ = start(
+        tmp_path,
+        tmp_path / "clinic",
+        """
+from app.widgets.body_backend import body_backend
+body_backend().loaded.connect(window.close)
+QTimer.singleShot(45_000, lambda: sys.exit(9))
+""",
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("after_ms", [250, 900])
+def test_closing_while_libraries_load_in_the_background_ends_cleanly(tmp_path: Path, after_ms: int) -> None:
+    done, _ = start(tmp_path, tmp_path / "clinic", f"QTimer.singleShot({after_ms}, window.close)")
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Fatal" not in done.stderr
+
+
+def newer_clinic(folder: Path) -> Path:
+    """A clinic that a later version has written."""
+    ClinicStore.open(folder).close()
+    with closing(sqlite3.connect(folder / "clinic.db")) as database:
+        database.execute("UPDATE alembic_version SET version_num = '9999_from_the_future'")
+        database.commit()
+    return folder
+
+
+def test_a_clinic_of_a_newer_version_is_told_in_the_window_and_left_alone(tmp_path: Path) -> None:
+    clinic = newer_clinic(tmp_path / "clinic")
+    before = (clinic / "clinic.db").read_bytes()
+    done, told = start(
+        tmp_path,
+        clinic,
+        """
+def look():
+    button = window.findChild(QWidget, "start_close")
+    if button.isVisible():
+        told["text"] = window.findChild(QWidget, "start_text").text()
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    else:
+        QTimer.singleShot(50, look)
+look()
+""",
+        first="start_window",
+    )
+    assert "newer version" in told["text"]
+    assert "Install" in told["text"], "it says what to do"
+    assert "main_window" not in told["heavy"]
+    assert done.returncode != 0
+    assert (clinic / "clinic.db").read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["newer", "no clinic"])
+def test_the_command_tells_the_same_in_one_line_when_its_window_is_closed(tmp_path: Path, kind: str) -> None:
+    clinic = tmp_path / "clinic"
+    if kind == "newer":
+        newer_clinic(clinic)
+    else:
+        clinic.mkdir()
+        (clinic / "clinic.db").write_bytes(b"this is not a database" * 100)
+    script = """
+import sys
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QWidget
+from app.gui import application
+from app.cli.main import main
+app = application()
+def look():
+    for window in app.topLevelWidgets():
+        button = window.findChild(QWidget, "start_close")
+        if button is not None and button.isVisible():
+            button.click()
+timer = QTimer(interval=50)
+timer.timeout.connect(look)
+timer.start()
+sys.exit(main(["run", "--data", sys.argv[1]]))
+"""
+    done = python(tmp_path, script, str(clinic))
+    assert done.returncode == 3, done.stderr
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith("geoderm: ")
