@@ -36,6 +36,20 @@ class SimulatedPair:
         return "same stance" if self.first == self.followup else "other stance"
 
 
+TUNING_PAIRS: tuple[SimulatedPair, ...] = (
+    SimulatedPair("m_young_avg", 1, "psi", "psi"),
+    SimulatedPair("f_old_heavy", 2, "A", "A"),
+    SimulatedPair("child10", 3, "psi", "psi"),
+    SimulatedPair("m_young_avg", 4, "A", "A"),
+    SimulatedPair("f_old_heavy", 5, "psi", "A"),
+    SimulatedPair("child10", 6, "A", "psi"),
+    SimulatedPair("m_young_avg", 7, "psi", "T"),
+    SimulatedPair("f_old_heavy", 8, "psi", "down"),
+    SimulatedPair("child10", 9, "A", "twist"),
+    SimulatedPair("m_young_avg", 10, "psi", "hip_hands", 10.0),
+)
+"""Bodies, stances and seeds that radii and thresholds were chosen on."""
+
 TEST_PAIRS: tuple[SimulatedPair, ...] = (
     SimulatedPair("m_tall_thin", 11, "psi", "psi"),
     SimulatedPair("f_young_avg", 12, "A", "A"),
@@ -48,7 +62,7 @@ TEST_PAIRS: tuple[SimulatedPair, ...] = (
     SimulatedPair("m_tall_thin", 19, "A", "twist"),
     SimulatedPair("f_young_avg", 20, "psi", "hip_hands"),
 )
-"""Bodies and seeds that no parameter was tuned on; those were m_young_avg, f_old_heavy and child10."""
+"""Bodies and seeds that no parameter was tuned on."""
 
 
 class SimulatedCases:

@@ -113,7 +113,7 @@ def draw_explanation(
         "2-bands": _with_legend(
             _mark(_draw_bands(after, explanation, colors), after, explanation.answer_m),
             f"Lesion {lesion}: bands",
-            f"Skin as far from each anchor as the lesion was, +- {1000 * explanation.delta_m:.0f} mm",
+            f"Skin as far from each anchor as the lesion was, ± {1000 * explanation.delta_m:.0f} mm",
             _distance_rows(explanation, colors),
         ),
         "3-votes": _with_legend(

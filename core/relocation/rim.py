@@ -13,7 +13,7 @@ from core.surface import BodySurface
 
 FloatArray = NDArray[np.float64]
 
-BEYOND_M = 0.012
+BEYOND_M = 0.015
 """A meeting place farther than this from the seen skin is not in the view."""
 FARTHEST_M = 0.12
 

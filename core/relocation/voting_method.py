@@ -14,7 +14,7 @@ from core.relocation.types import Estimate
 from core.relocation.voting import VotingOutcome, grid_edges, triangle_edges, vote
 from core.surface import BodySurface
 
-RADIUS95_M = 0.09
+RADIUS95_M = 0.075
 """95 % of votes lay within this of the truth on the tuning bodies (same and other stance pooled)."""
 
 EDGE_JUMP_M = 0.05
