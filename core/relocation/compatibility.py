@@ -18,9 +18,9 @@ OPPOSITE_DEG = 110.0
 WHOLE_BODY_PAIRS = 66
 """Pairs of anchors (twelve anchors) from which on a whole body was compared."""
 SIZE_DIFFERENCE, PART_SIZE_DIFFERENCE = 0.10, 0.25
-"""Median relative difference of inter-anchor geodesics beyond which it is another person: of whole bodies, and
-of parts. The same person stayed below 0.04 on simulated whole bodies, below 0.21 on single noisy frames of upper
-bodies."""
+"""Median relative difference of inter-anchor geodesics beyond which it is another person: of whole bodies,
+and of parts. The same person stayed below 0.04 on simulated whole bodies, below 0.21 on single noisy frames
+of upper bodies."""
 SHAPE_DIFFERENCE = 0.20
 """Median absolute deviation from that median: the same, for people of one size.
 

@@ -13,8 +13,10 @@ FloatArray = NDArray[np.float64]
 
 RADIUS_SCALE = 1.25
 RADIUS_FLOOR_M = 0.012
-"""Calibrated on the tuning pairs of the simulated patient (three bodies, six changes of stance, tracked joints):
-about 95 % of errors lie within ``RADIUS_FLOOR_M + RADIUS_SCALE * spread``. Real skin may do worse."""
+"""Calibrated on the tuning pairs of the simulated patient (three bodies, six changes of stance, tracked
+joints): about 95 % of errors lie within ``RADIUS_FLOOR_M + RADIUS_SCALE * spread``.
+
+Real skin may do worse."""
 
 HIGHEST_CONFIDENCE = 0.9
 """Geometry alone never earns more."""

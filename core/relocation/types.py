@@ -20,9 +20,9 @@ evidence; not_visible: the place is not in this view; refused: the evidence carr
 DEFAULT_DELTA_M = 0.03
 """Half width of a voting band (eq. 1).
 
-Chosen on simulated tuning bodies (average, heavy and child shapes and mixtures of them; 6 pairs in the same stance,
-10 in another; 553 lesions, tracked joints): the pooled mean error of both voting methods is flat between 20 and
-40 mm and grows beyond; 30 mm is the middle."""
+Chosen on simulated tuning bodies (average, heavy and child shapes and mixtures of them; 6 pairs in the same
+stance, 10 in another; 553 lesions, tracked joints): the pooled mean error of both voting methods is flat
+between 20 and 40 mm and grows beyond; 30 mm is the middle."""
 
 
 @dataclass(frozen=True)
