@@ -118,7 +118,8 @@ class RuntimeProcess:
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join(5.0)
-            self._process.close()
+            if not self._process.is_alive():
+                self._process.close()
             self._process = None
 
 
