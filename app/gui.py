@@ -25,6 +25,9 @@ _CALM_MS = 200
 """From the first paint to the loading of heavy libraries: what was painted reaches the screen first."""
 
 
+_loading: list[threading.Thread] = []
+
+
 def application() -> QApplication:
     """The Qt application in the house style."""
     from app.theme import apply_theme
@@ -63,7 +66,18 @@ def _load_heavy_things() -> None:
     from app.widgets.body_backend import body_backend
 
     body_backend().load()
-    threading.Thread(target=_warm_up, name="kernels", daemon=True).start()
+    kernels = threading.Thread(target=_warm_up, name="kernels", daemon=True)
+    _loading.append(kernels)
+    kernels.start()
+
+
+def _await_heavy_things() -> None:
+    """Let what loads in the background end: native code that the end of the process interrupts aborts it."""
+    from app.widgets.body_backend import body_backend
+
+    for thread in _loading:
+        thread.join()
+    body_backend().join()
 
 
 def _warm_up() -> None:
@@ -127,6 +141,7 @@ def run_gui(
         if unused is not None:
             unused.close()
         start.deleteLater()
+        _await_heavy_things()
     if start.error is not None:
         raise start.error
     return code

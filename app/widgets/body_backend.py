@@ -30,6 +30,11 @@ class BodyBackend(QObject):
             self._thread = threading.Thread(target=self._import, name="3d-libraries", daemon=True)
             self._thread.start()
 
+    def join(self) -> None:
+        """Wait until loading has ended, if it was started; for the end of the application."""
+        if self._thread is not None:
+            self._thread.join()
+
     def _import(self) -> None:
         importlib.import_module(_MODULE)
         self._imported.emit()

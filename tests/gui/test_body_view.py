@@ -243,7 +243,7 @@ class Renders:
 
 
 def test_while_dragging_every_painted_frame_is_rendered_once(view: BodyView) -> None:
-    view.set_surface(*body(150, 140))
+    view.set_surface(*body(150, 110))
     QTest.qWait(100)
     paints: list[float] = []
     canvas(view).frameSwapped.connect(lambda: paints.append(time.monotonic()))  # type: ignore[attr-defined]
@@ -279,7 +279,7 @@ def test_while_it_turns_a_light_mesh_is_shown_and_then_the_full_one(view: BodyVi
             if a.GetVisibility()
         )
 
-    vertices, faces = body(150, 140)
+    vertices, faces = body(150, 110)
     view.set_surface(vertices, faces)
     full = len(faces)
     assert triangles() == full
@@ -317,7 +317,7 @@ def test_closing_is_safe_at_any_moment_and_frees_opengl(show: Show, moment: str)
     view = BodyView()
     if moment != "never shown":
         show(view, (500, 500))
-        view.set_surface(*body(150, 150))
+        view.set_surface(*(body(150, 110) if moment == "in a drag" else body(40, 40)))
         view.set_lesions(LESIONS)
         QApplication.processEvents()
         window = weakref.ref(canvas(view).render_window)  # type: ignore[attr-defined]

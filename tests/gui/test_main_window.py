@@ -81,12 +81,15 @@ def test_privacy_mode_has_a_key_and_outlives_the_window(small_desk: Desk, open_d
     assert names_in(everything_shown(again)) == []
 
 
-def test_signing_out_in_the_middle_of_a_visit_keeps_it_and_shows_nothing(
+def test_a_visit_outlives_signing_out_and_closing_the_window(
     world: World, tmp_path: Path, open_desk: OpenDesk
 ) -> None:
     shutil.copytree(world.root / "clinic", tmp_path / "clinic")
     desk = open_desk()
-    desk.open_patient("novak")
+    patient = desk.store.patients.search("muller")[0].patient
+    desk.open_patient("muller")
+    desk.click("patient_pane_body")
+    desk.idle()
     desk.click("start_visit")
     desk.page.captures.deck.choose_path(world.root / "psi")  # type: ignore[attr-defined]
     desk.idle()
@@ -96,8 +99,12 @@ def test_signing_out_in_the_middle_of_a_visit_keeps_it_and_shows_nothing(
     assert desk.is_shown("login_page")
     assert names_in(everything_shown(desk)) == []
     desk.sign_in()
-    desk.open_patient("novak")
+    desk.open_patient("muller")
     assert desk.text("start_visit") == "Continue visit"
+    desk.click("start_visit")
+    desk.find("visit_page")
+    desk.main.close()
+    assert [v.is_open for v in desk.store.visits.list(patient.id)] == [False, True]
 
 
 def test_signing_out_while_work_runs_ends_it(world: World, tmp_path: Path, open_desk: OpenDesk) -> None:
@@ -114,25 +121,6 @@ def test_signing_out_while_work_runs_ends_it(world: World, tmp_path: Path, open_
     desk.idle()
     assert desk.is_shown("login_page")
     assert all(not desk.store.captures.list(v.id) for v in desk.store.visits.list(patient.id))
-
-
-def test_closing_the_window_in_the_middle_of_a_visit_keeps_the_visit(
-    world: World, tmp_path: Path, open_desk: OpenDesk
-) -> None:
-    shutil.copytree(world.root / "clinic", tmp_path / "clinic")
-    desk = open_desk()
-    desk.open_patient("muller")
-    desk.click("patient_pane_body")
-    desk.idle()
-    QTest.qWait(50)
-    desk.click("start_visit")
-    desk.page.captures.deck.choose_path(world.root / "psi")  # type: ignore[attr-defined]
-    desk.idle()
-    desk.click("stance_primary")
-    desk.idle()
-    patient = desk.store.patients.search("muller")[0].patient
-    desk.main.close()
-    assert [v.is_open for v in desk.store.visits.list(patient.id)] == [False, True]
 
 
 def test_an_error_nobody_expected_is_told_without_a_trace(
