@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from app.context import AppContext
 from app.tasks import TaskFailure
 from app.theme import icon, icon_pixmap, palette, style_class
-from app.widgets.sheet import tell
+from app.widgets.sheet import Sheet, tell
 from app.windows.login import LoginPage
 from core.errors import GeodermError
 
@@ -73,7 +73,7 @@ class MainWindow(QMainWindow):
         QShortcut(
             QKeySequence("Ctrl+Shift+P"), self, lambda: context.set_privacy_mode(not context.privacy_mode)
         )
-        QShortcut(QKeySequence("Ctrl+F"), self, self.show_patients)
+        QShortcut(QKeySequence("Ctrl+F"), self, self._find_patient)
         context.records_changed.connect(self._show_title)
         self._painted = False
         self._show_privacy()
@@ -169,6 +169,12 @@ class MainWindow(QMainWindow):
         self._leave_visit()
         self._patients.refresh()  # type: ignore[attr-defined]
         self._show_page(self._patients)
+
+    @Slot()
+    def _find_patient(self) -> None:
+        """Go to the list, unless a sheet waits for an answer."""
+        if not any(sheet.isVisible() for sheet in self.findChildren(Sheet)):
+            self.show_patients()
 
     @Slot(int)
     def show_patient(self, patient_id: int) -> None:

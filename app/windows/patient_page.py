@@ -261,7 +261,8 @@ class PatientPage(QWidget):
         parts = []
         if not self._context.privacy_mode and p.birth_date is not None:
             parts.append(f"born {p.birth_date:%d %b %Y}, {p.age_on(date.today())} years")
-        parts += [_SEX[p.sex], p.clinic_number if not self._context.privacy_mode else "", p.note]
+        hidden = self._context.privacy_mode  # a note may name the patient, too
+        parts += [_SEX[p.sex], "" if hidden else p.clinic_number, "" if hidden else p.note]
         self.details.setText("   ·   ".join(x for x in parts if x))
         self.start.setText(self._model.next_step)
 
