@@ -18,6 +18,19 @@ STEP_TIMEOUT_S = 30.0
 WORK_TIMEOUT_S = 300.0
 
 
+def _let_run(seconds: float) -> None:
+    """Let the application run for a while.
+
+    Not ``QTest.qWait``: it keeps Python's lock while it waits, and the task runner's thread starves.
+    """
+    deadline = time.monotonic() + seconds
+    while True:
+        QApplication.processEvents()
+        if time.monotonic() >= deadline:
+            return
+        time.sleep(0.005)
+
+
 class DriverError(AssertionError):
     """The windows did not do what a person would expect of them."""
 
@@ -50,7 +63,7 @@ class WindowDriver:
             if time.monotonic() > deadline:
                 self.shoot("stuck")
                 raise DriverError(f"waited {timeout_s:.0f} s for: {what}. On screen: {self.banner_text()}")
-            QTest.qWait(20)
+            _let_run(0.02)
 
     def banner_text(self) -> str:
         """Text of the visible message banners."""
@@ -92,7 +105,7 @@ class WindowDriver:
             widget.setFocus(Qt.FocusReason.MouseFocusReason)
         QTest.mouseMove(widget, widget.rect().center())
         QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=widget.rect().center())
-        QTest.qWait(60)
+        _let_run(0.06)
 
     def type(self, name: str, text: str, *, enter: bool = False) -> None:
         """Replace the text of a field by typing."""
@@ -111,7 +124,7 @@ class WindowDriver:
                 QTest.keyClick(field, character) if character.isascii() else _input(field, character)
         if enter:
             QTest.keyClick(field, Qt.Key.Key_Return)
-        QTest.qWait(60)
+        _let_run(0.06)
 
     def choose(self, name: str, text: str) -> None:
         """Choose the entry of a combo box that contains ``text``, with the keyboard."""
@@ -127,35 +140,35 @@ class WindowDriver:
             if box.currentIndex() == row:
                 break
             QTest.keyClick(box, Qt.Key.Key_Down)
-        QTest.qWait(60)
+        _let_run(0.06)
 
     def click_photo(self, name: str, u: float, v: float) -> None:
         """Click an image pixel of a photo view, zoomed in so that the click is finer than a pixel."""
         photo = self.find(name, PhotoView)
         photo.center_on(u, v, 6.0)
-        QTest.qWait(40)
+        _let_run(0.04)
         self._move_and_click(photo, photo.viewport_position(u, v))
 
     def drag_photo(self, name: str, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Drag from one image pixel to another."""
         photo = self.find(name, PhotoView)
         photo.center_on((start[0] + end[0]) / 2, (start[1] + end[1]) / 2, 4.0)
-        QTest.qWait(40)
+        _let_run(0.04)
         a, b = photo.viewport_position(*start), photo.viewport_position(*end)
         QTest.mousePress(photo.viewport(), Qt.MouseButton.LeftButton, pos=a)
         for i in range(1, 9):
             QTest.mouseMove(photo.viewport(), a + (b - a) * (i / 8), 15)
         QTest.mouseRelease(photo.viewport(), Qt.MouseButton.LeftButton, pos=b)
-        QTest.qWait(80)
+        _let_run(0.08)
 
     def _move_and_click(self, photo: PhotoView, place: QPoint) -> None:
         QTest.mouseMove(photo.viewport(), place)
         QTest.mouseClick(photo.viewport(), Qt.MouseButton.LeftButton, pos=place)
-        QTest.qWait(60)
+        _let_run(0.06)
 
     def settle(self, seconds: float = 0.4) -> None:
         """Let paints and short animations finish."""
-        QTest.qWait(int(1000 * seconds))
+        _let_run(seconds)
 
     def shoot(self, name: str) -> Path:
         """Save a picture of the window."""
