@@ -14,6 +14,7 @@ from core.relocation.result_json import read_lesions, write_json
 from core.relocation.types import (
     DEFAULT_DELTA_M,
     Candidate,
+    ConfirmedLesion,
     Estimate,
     LesionQuery,
     LesionStatus,
@@ -29,6 +30,7 @@ __all__ = [
     "DEFAULT_METHOD",
     "RELOCATION_METHODS",
     "Candidate",
+    "ConfirmedLesion",
     "Estimate",
     "LesionQuery",
     "LesionStatus",

@@ -25,6 +25,15 @@ class PickedLesion:
 
 
 @dataclass(frozen=True, eq=False)
+class KnownPlace:
+    """A place that is certain on both skins: a lesion the doctor has confirmed."""
+
+    id: str
+    first: SurfacePoint
+    followup: SurfacePoint
+
+
+@dataclass(frozen=True, eq=False)
 class VisitPair:
     """First capture and follow-up of one person."""
 

@@ -9,7 +9,7 @@ from typing import Protocol
 from core.errors import InputError
 from core.progress import Progress
 from core.relocation.clock import PhaseClock
-from core.relocation.pair import PickedLesion, VisitPair
+from core.relocation.pair import KnownPlace, PickedLesion, VisitPair
 from core.relocation.types import Estimate, RelocationOptions, Spot
 
 DEFAULT_METHOD = "trilateration"
@@ -28,6 +28,8 @@ class MethodContext:
         Of every random draw.
     clock : PhaseClock
     progress : Progress
+    known : tuple of KnownPlace
+        Confirmed lesions: anchors that are certain.
     """
 
     options: RelocationOptions
@@ -35,6 +37,7 @@ class MethodContext:
     seed: int
     clock: PhaseClock
     progress: Progress
+    known: tuple[KnownPlace, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

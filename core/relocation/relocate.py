@@ -13,10 +13,11 @@ from core.progress import Progress, ScaledProgress, no_progress
 from core.relocation.bones import Bone, bones
 from core.relocation.clock import PhaseClock
 from core.relocation.compatibility import why_not
-from core.relocation.pair import PickedLesion, VisitPair
+from core.relocation.pair import KnownPlace, PickedLesion, VisitPair
 from core.relocation.registry import DEFAULT_METHOD, MethodContext, MethodOutcome, relocation_method
 from core.relocation.types import (
     Candidate,
+    ConfirmedLesion,
     Estimate,
     LesionQuery,
     LesionStatus,
@@ -37,6 +38,7 @@ def relocate(
     appearance: bool = True,
     seed: int = 0,
     options: RelocationOptions | None = None,
+    confirmed: Sequence[ConfirmedLesion] = (),
     progress: Progress = no_progress,
 ) -> RelocationResult:
     """Find lesions of one capture again in another.
@@ -52,6 +54,8 @@ def relocate(
         Whether colour may be used for matching.
     seed : int
         Of every random draw, so that a result can be repeated.
+    confirmed : sequence of ConfirmedLesion
+        Lesions whose place in both captures is certain: anchors beside the skeleton's.
 
     Returns
     -------
@@ -83,7 +87,14 @@ def relocate(
         with clock.phase("geodesics"):
             obstacle = why_not(pair)
         if not obstacle:
-            context = MethodContext(options, appearance, seed, clock, ScaledProgress(progress, 0.1, 0.95))
+            context = MethodContext(
+                options,
+                appearance,
+                seed,
+                clock,
+                ScaledProgress(progress, 0.1, 0.95),
+                _certain(first, followup, confirmed),
+            )
             outcome = chosen.estimate(pair, placed, context)
     with clock.phase("visibility"):
         skeleton = bones(pair) if options.check_visibility and placed and not obstacle else ()
@@ -112,6 +123,19 @@ def relocate(
     return RelocationResult(
         chosen.name, lesions, clock.seconds(), warnings, outcome.new_spots, outcome.vanished_spots
     )
+
+
+def _certain(
+    first: AnalysedCapture, followup: AnalysedCapture, confirmed: Sequence[ConfirmedLesion]
+) -> tuple[KnownPlace, ...]:
+    """Confirmed lesions on both skins; those whose pixel is not on the skin are left out."""
+    out = []
+    for lesion in confirmed:
+        here = pick_query(first, lesion.first)
+        there = pick_skin(followup.scan, lesion.followup_pixel)
+        if here.point is not None and there.point is not None:
+            out.append(KnownPlace(lesion.first.id, here.point, there.point))
+    return tuple(out)
 
 
 def pick_query(first: AnalysedCapture, query: LesionQuery) -> SkinPick:

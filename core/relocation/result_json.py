@@ -70,7 +70,10 @@ def _query(path: Path, index: int, entry: object) -> LesionQuery:
     pixel, depth_pixel = (_pair(path, where, key, entry.get(key)) for key in ("pixel", "depth_pixel"))
     if pixel is None and depth_pixel is None:
         raise InputError(f'{path}: field "{where}" needs "pixel" or "depth_pixel".')
-    return LesionQuery(name, pixel, depth_pixel, capture)
+    healed = entry.get("healed", False)
+    if not isinstance(healed, bool):
+        raise InputError(f'{path}: field "{where}.healed" must be true or false.')
+    return LesionQuery(name, pixel, depth_pixel, capture, healed)
 
 
 def _pair(path: Path, where: str, key: str, value: object) -> tuple[float, float] | None:

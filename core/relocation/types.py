@@ -38,16 +38,36 @@ class LesionQuery:
         Pixel of the first visit's depth image; used when there is no `pixel`.
     capture : str or None
         Name of the capture of the visit in which the pixel was clicked.
+    healed : bool
+        The lesion is no longer there (excised, or a healed biopsy): its site is sought by geometry and by the
+        skin around it, never by its own looks.
     """
 
     id: str
     pixel: tuple[float, float] | None = None
     depth_pixel: tuple[float, float] | None = None
     capture: str | None = None
+    healed: bool = False
 
     def __post_init__(self) -> None:
         if self.pixel is None and self.depth_pixel is None:
             raise InputError(f'Lesion "{self.id}" has neither "pixel" nor "depth_pixel".')
+
+
+@dataclass(frozen=True, eq=False)
+class ConfirmedLesion:
+    """A lesion whose place the doctor has confirmed in both captures: an anchor for the others.
+
+    Attributes
+    ----------
+    first : LesionQuery
+        Where it was clicked in the first capture.
+    followup_pixel : (u, v)
+        Where it was confirmed in the follow-up's picture (colour image, or depth image without one).
+    """
+
+    first: LesionQuery
+    followup_pixel: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
