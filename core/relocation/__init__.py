@@ -9,7 +9,7 @@ from core.relocation.registry import (
     register_relocation_method,
     relocation_method,
 )
-from core.relocation.relocate import pick_query, relocate, relocate_visit
+from core.relocation.relocate import pick_query, relocate
 from core.relocation.result_json import read_lesions, write_json
 from core.relocation.types import (
     DEFAULT_DELTA_M,
@@ -24,6 +24,7 @@ from core.relocation.types import (
     RelocationResult,
     Spot,
 )
+from core.relocation.visits import relocate_visit
 
 __all__ = [
     "DEFAULT_DELTA_M",
