@@ -19,6 +19,8 @@ COMMAND_MODULES = (
     "app.cli.gui",
     "app.cli.capture_info",
     "app.cli.relocate",
+    "app.cli.relocate_batch",
+    "app.cli.verify_site",
     "app.cli.geodesics",
     "app.cli.simulate",
     "app.cli.records",

@@ -25,8 +25,8 @@ MISFIT_M = 0.05
 """A trunk is rigid: joints that fit it worse were not found, but guessed.
 
 On simulated patients the worst torso joint misfits by 33 mm between tracked front and back views, by 135 to
-270 mm as soon as a side view is tracked, and by 4 mm with true joints, front to side. Only then places carried by
-the bones lie where they should (18 mm at most, against 80 to 310 mm)."""
+270 mm as soon as a side view is tracked, and by 4 mm with true joints, front to side. Only where it is small
+do places carried by the bones lie where they should (18 mm at most, against 80 to 310 mm)."""
 
 OPPOSITE = {"front": "back", "back": "front", "left": "right", "right": "left"}
 """Views that show no common skin but a rim."""
