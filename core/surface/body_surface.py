@@ -151,6 +151,12 @@ class BodySurface:
         p = np.asarray(points, dtype=float).reshape(-1, 3)
         return np.asarray(self._vertex_tree.query(p)[1], dtype=np.int64)
 
+    def vertices_within(self, points: ArrayLike, reach_m: float) -> NDArray[np.int64]:
+        """Index (k,) of the vertex nearest to each of ``points`` (k, 3); -1 where none is within reach."""
+        p = np.asarray(points, dtype=float).reshape(-1, 3)
+        distance, index = self._vertex_tree.query(p, distance_upper_bound=reach_m)
+        return np.where(np.isfinite(distance), index, -1).astype(np.int64)
+
     def point(self, triangle: int, barycentric: ArrayLike) -> SurfacePoint:
         """The surface point of a triangle with the given corner weights (3,)."""
         weights = np.asarray(barycentric, dtype=float)
