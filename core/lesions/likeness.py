@@ -78,7 +78,7 @@ def evidence(looks: Looks, noises: FloatArray, radius_m: FloatArray, around: Sur
         [
             np.ones_like(size),
             np.log(np.clip(looks.contrast, 0.02, 1.0)),
-            np.log(np.clip(noises, 3.0, 30.0)),
+            np.log(np.clip(noises, 2.0, 30.0)),
             np.clip(looks.closed, 0.0, 1.0),
             np.clip(looks.across, 0.0, 1.0),
             np.clip(looks.rough, 0.0, 0.5),
@@ -94,7 +94,7 @@ def evidence(looks: Looks, noises: FloatArray, radius_m: FloatArray, around: Sur
     )
 
 
-_WEIGHTS = np.array([-7.6, 0.6, 0.9, 7.0, 1.0, -6.0, 1.8, -0.7, -2.0, -0.9, -0.5, -3.4, -1.8])
+_WEIGHTS = np.array([-5.94, 0.3, 0.83, 5.21, 2.26, -8.59, 0.5, -1.12, -4.93, -1.62, -0.5, -2.8, -1.47])
 
 
 def likeness(looks: Looks, noises: FloatArray, radius_m: FloatArray, around: Surroundings) -> FloatArray:

@@ -21,10 +21,14 @@ _LARGEST_M = 0.011
 _REACH_M = 0.012
 _LEAST_RESPONSE = 0.008
 _GLOBAL_NOISES = 3.5
-_LOCAL_NOISES = 4.0
+_LOCAL_NOISES = 3.0
+_LEAST_ROUND = 0.1
 _LOCAL_SHRINK = 4
 _LOCAL_CELLS = 7
-_MOST = 4000
+_MOST = 6000
+# Before they are measured only blobs of neighbouring scales exclude each other: a shadow answers more
+# strongly than the mole that lies in it.
+_SIMILAR = 1.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +108,23 @@ def _maxima(
             np.minimum(x // (2 * _LOCAL_SHRINK), local.shape[1] - 1),
         ]
     )
-    keep = noises > _LOCAL_NOISES
+    keep = (noises > _LOCAL_NOISES) & (_roundness(response, y, x) > _LEAST_ROUND)
     x, y, at, noises = x[keep], y[keep], at[keep], noises[keep]
     dx = _vertex(response[y, x - 1], at, response[y, x + 1])
     dy = _vertex(response[y - 1, x], at, response[y + 1, x])
     places = np.stack([x + dx, y + dy], axis=1).astype(float) * size
     radius = np.full(len(x), sigma * np.sqrt(_STEP) * size * _RADIUS_PER_SIGMA)
     return Blobs(places, radius, at.astype(float), noises.astype(float))
+
+
+def _roundness(response: Image, y: NDArray[np.int64], x: NDArray[np.int64]) -> Image:
+    """Smaller over larger curvature at places of the image: 1 on a round top, 0 on a ridge."""
+    at = response[y, x]
+    xx = 2.0 * at - response[y, x - 1] - response[y, x + 1]
+    yy = 2.0 * at - response[y - 1, x] - response[y + 1, x]
+    xy = response[y + 1, x - 1] + response[y - 1, x + 1] - response[y - 1, x - 1] - response[y + 1, x + 1]
+    mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), 0.25 * xy)
+    return np.asarray((mean - half) / np.maximum(mean + half, 1e-9))
 
 
 def _vertex(before: Image, at: Image, after: Image) -> Image:
@@ -146,19 +160,30 @@ def _without_doubles(levels: list[Blobs]) -> Blobs:
         else Blobs(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
     )
     blobs = blobs.take(np.argsort(-blobs.response, kind="stable")[: 3 * _MOST])
-    if len(blobs) < 2:
-        return blobs
-    reach = np.maximum(2.0, 0.8 * blobs.radius)
-    pairs = cKDTree(blobs.places).query_pairs(float(reach.max()), output_type="ndarray")
-    pairs = np.sort(pairs, axis=1)
-    apart = np.linalg.norm(blobs.places[pairs[:, 0]] - blobs.places[pairs[:, 1]], axis=1)
-    strong, weak = pairs[apart < np.maximum(reach[pairs[:, 0]], reach[pairs[:, 1]])].T
+    keep = strongest_only(blobs.places, blobs.radius, _SIMILAR)
+    return blobs.take(np.flatnonzero(keep)[:_MOST])
+
+
+def strongest_only(places: FloatArray, radius: FloatArray, similar: float = np.inf) -> NDArray[np.bool_]:
+    """Which of overlapping blobs, given strongest first, stay (n,).
+
+    One gives way to a stronger that stays if their centres are nearer than most of the larger radius and
+    neither is more than ``similar`` times as large as the other.
+    """
+    if len(places) < 2:
+        return np.ones(len(places), np.bool_)
+    reach = np.maximum(1.5, 0.8 * radius)
+    pairs = np.sort(cKDTree(places).query_pairs(float(reach.max()), output_type="ndarray"), axis=1)
+    one, two = pairs.T
+    apart = np.linalg.norm(places[one] - places[two], axis=1)
+    ratio = np.maximum(radius[one] / radius[two], radius[two] / radius[one])
+    strong, weak = pairs[(apart < np.maximum(reach[one], reach[two])) & (ratio < similar)].T
     # 0 undecided, 1 kept, 2 dropped: whoever has no stronger neighbour left stays and drops its neighbours.
-    state = np.zeros(len(blobs), np.int8)
+    state = np.zeros(len(places), np.int8)
     while (state == 0).any():
-        blocked = np.zeros(len(blobs), np.bool_)
+        blocked = np.zeros(len(places), np.bool_)
         blocked[weak[state[strong] == 0]] = True
         state[(state == 0) & ~blocked] = 1
         dropped = weak[state[strong] == 1]
         state[dropped] = 2
-    return blobs.take(np.flatnonzero(state == 1)[:_MOST])
+    return np.asarray(state == 1)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.lesions.body_picture import cut_body_picture
+from core.lesions.body_picture import BodyPicture, cut_body_picture
 from core.lesions.lifting import lift_pixels
 from core.lesions.likeness import likeness, look_around
-from core.lesions.measure import measure_blobs, skin_axes
-from core.lesions.scale_space import find_blobs
+from core.lesions.measure import Looks, darker_all_round, measure_blobs, skin_axes
+from core.lesions.scale_space import find_blobs, strongest_only
 from core.surface.scan import BodyScan
 
 FloatArray = NDArray[np.float64]
@@ -80,25 +80,33 @@ def detect_spots(scan: BodyScan) -> SkinSpots:
     picture = cut_body_picture(scan)
     if picture is None:
         return SkinSpots.none()
+    camera, to_color = scan.capture.rig.picture_camera, scan.capture.rig.picture_from_depth
     blobs = find_blobs(picture)
     near = picture.vertex[picture.cells_at(blobs.places)]
     points, normals = scan.surface.vertices[near], scan.surface.normals[near]
     axes = _axes(scan, points, normals)
-    short = np.linalg.norm(axes[:, 1], axis=1)
-    looks = measure_blobs(picture, blobs.places, blobs.radius / np.sqrt(short), axes)
-    radius_px = looks.radius * picture.shrink
-    per_px = scan.capture.rig.picture_from_depth.apply(points)[:, 2] / scan.capture.rig.picture_camera.fx
-    around = look_around(scan, picture, looks.places, points)
-    confidence = likeness(looks, blobs.noises, radius_px * per_px, around)
+    guess = blobs.radius / np.sqrt(np.linalg.norm(axes[:, 1], axis=1))
+    per_px = picture.shrink * to_color.apply(points)[:, 2] / camera.fx
+    rows = np.flatnonzero(darker_all_round(picture, blobs.places, guess, axes))
+    blobs, guess, axes, per_px, points = blobs.take(rows), guess[rows], axes[rows], per_px[rows], points[rows]
+    looks = measure_blobs(picture, blobs.places, guess, axes)
+    confidence = _judge(scan, picture, looks, blobs.noises, per_px, points)
     rows = np.flatnonzero((confidence >= _LEAST_CONFIDENCE) & (looks.contrast > 0))
     rows = rows[np.argsort(-confidence[rows], kind="stable")]
+    rows = rows[strongest_only(looks.places[rows], looks.radius[rows])]
+    # Once more from the better start, which makes the centres independent of where the blobs were found.
+    looks = measure_blobs(picture, looks.places[rows], looks.radius[rows], axes[rows])
+    confidence = _judge(scan, picture, looks, blobs.noises[rows], per_px[rows], points[rows])
+    rows = np.flatnonzero((confidence >= _LEAST_CONFIDENCE) & (looks.contrast > 0))
+    rows = rows[np.argsort(-confidence[rows], kind="stable")]
+    rows = rows[strongest_only(looks.places[rows], looks.radius[rows])]
     pixels = picture.to_picture(looks.places[rows])
     lifted = lift_pixels(scan, pixels)
-    depth = scan.capture.rig.picture_from_depth.apply(lifted.points_m)[:, 2]
+    radius_px = looks.radius[rows] * picture.shrink
     spots = SkinSpots(
         pixels=pixels,
-        radius_px=radius_px[rows],
-        radius_m=radius_px[rows] * depth / scan.capture.rig.picture_camera.fx,
+        radius_px=radius_px,
+        radius_m=radius_px * to_color.apply(lifted.points_m)[:, 2] / camera.fx,
         contrast=looks.contrast[rows],
         color=looks.color[rows],
         confidence=confidence[rows],
@@ -109,6 +117,18 @@ def detect_spots(scan: BodyScan) -> SkinSpots:
         skin_color=looks.skin_color[rows],
     )
     return spots.take(lifted.on_skin)
+
+
+def _judge(
+    scan: BodyScan,
+    picture: BodyPicture,
+    looks: Looks,
+    noises: FloatArray,
+    m_per_px: FloatArray,
+    points: FloatArray,
+) -> FloatArray:
+    around = look_around(scan, picture, looks.places, points)
+    return likeness(looks, noises, looks.radius * m_per_px, around)
 
 
 def _axes(scan: BodyScan, points: FloatArray, normals: FloatArray) -> FloatArray:
