@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from devices.simulator.body import SHAPES
     from devices.simulator.camera_device import SimulatedCamera, SimulatedScene
     from devices.simulator.patient import SimulatedPatient
     from devices.simulator.room import (
@@ -21,13 +20,17 @@ if TYPE_CHECKING:
         VisitChange,
         make_rig,
     )
+    from devices.simulator.shapes import CALIBRATION_SHAPES, SHAPES, TEST_SHAPES, TUNING_SHAPES
     from devices.simulator.stances import STANCES
     from devices.simulator.truth import CaptureTruth, SimulatedCapture, read_truth, write_simulated
 
 __all__ = [
+    "CALIBRATION_SHAPES",
     "SHAPES",
     "STANCES",
     "STILL",
+    "TEST_SHAPES",
+    "TUNING_SHAPES",
     "Bystander",
     "CaptureTruth",
     "Room",
@@ -44,7 +47,10 @@ __all__ = [
 ]
 
 _HOME = {
-    "SHAPES": "body",
+    "CALIBRATION_SHAPES": "shapes",
+    "SHAPES": "shapes",
+    "TEST_SHAPES": "shapes",
+    "TUNING_SHAPES": "shapes",
     "STANCES": "stances",
     "SimulatedCamera": "camera_device",
     "SimulatedScene": "camera_device",

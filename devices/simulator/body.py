@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from core.errors import InputError
+from devices.simulator.shapes import SHAPES as SHAPES
+from devices.simulator.shapes import read_shape
 from resources import resource_path
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
-
-SHAPES = ("m_young_avg", "f_young_avg", "m_tall_thin", "f_old_heavy", "child10")
-"""Names of the shipped body shapes."""
 
 _HIDDEN_PARTS = ("mouth_cavity", "tongue", "eye_cavity.L", "eye_cavity.R", "eye_back.L", "eye_back.R")
 _SIDES = (("L", "left"), ("R", "right"))
@@ -141,25 +140,40 @@ def load_body(shape: str) -> BodyModel:
         raise InputError(
             f"There is no simulated body called '{shape}'.", f"Choose one of: {', '.join(SHAPES)}."
         )
-    with (
-        np.load(resource_path("bodies", "anny_common.npz")) as common,
-        np.load(resource_path("bodies", f"anny_{shape}.npz")) as own,
-    ):
-        reference_bones = own["ref_bones"].astype(float)
+    own = read_shape(shape)
+    with np.load(resource_path("bodies", "anny_common.npz")) as common:
+        weight_bones, weights = common["widx"].astype(np.int64), common["weights"].astype(float)
+        skin_from_bind = np.linalg.inv(own.rest_bones)
+        reference = own.reference
+        if reference is None:
+            reference = _skinned(own.ref_bones @ skin_from_bind, own.bind, weight_bones, weights)
         return BodyModel(
             shape=shape,
             triangles=common["faces"].astype(np.int32),
-            reference=own["ref_vertices"].astype(float),
-            bind=own["rest_vertices"].astype(float),
-            skin_from_bind=np.linalg.inv(own["rest_bones"].astype(float)),
-            bone_rotation=reference_bones[:, :3, :3],
-            bone_origin=reference_bones[:, :3, 3],
+            reference=reference,
+            bind=own.bind,
+            skin_from_bind=skin_from_bind,
+            bone_rotation=own.ref_bones[:, :3, :3],
+            bone_origin=own.ref_bones[:, :3, 3],
             bones=tuple(str(name) for name in common["bones"]),
             parents=common["parents"].astype(np.int64),
-            weight_bones=common["widx"].astype(np.int64),
-            weights=common["weights"].astype(float),
+            weight_bones=weight_bones,
+            weights=weights,
             parts={key[3:]: common[key] for key in common.files if key.startswith("fm_")},
         )
+
+
+def _skinned(
+    frames: FloatArray, bind: FloatArray, weight_bones: NDArray[np.int64], weights: FloatArray
+) -> FloatArray:
+    """Vertices (n, 3) moved by the bones' motions (bones, 4, 4), blended by weight."""
+    skin = frames[:, :3]
+    homogeneous = np.column_stack([bind, np.ones(len(bind))])
+    vertices = np.zeros_like(bind)
+    for k in range(weights.shape[1]):
+        moved = np.einsum("vij,vj->vi", skin[weight_bones[:, k]], homogeneous)
+        vertices += weights[:, k, None] * moved
+    return vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,13 +220,8 @@ def pose_body(model: BodyModel, local: dict[str, FloatArray], bind: FloatArray |
     frames = np.tile(np.eye(4), (count, 1, 1))
     frames[:, :3, :3] = rotation @ model.bone_rotation
     frames[:, :3, 3] = origin
-    skin = (frames @ model.skin_from_bind)[:, :3]
     shape = model.bind if bind is None else bind
-    homogeneous = np.column_stack([shape, np.ones(len(shape))])
-    vertices = np.zeros_like(shape)
-    for k in range(model.weights.shape[1]):
-        moved = np.einsum("vij,vj->vi", skin[model.weight_bones[:, k]], homogeneous)
-        vertices += model.weights[:, k, None] * moved
+    vertices = _skinned(frames @ model.skin_from_bind, shape, model.weight_bones, model.weights)
     pelvis = 0.5 * (origin[model.bone_index["upperleg01.L"]] + origin[model.bone_index["upperleg01.R"]])
     ground = np.array([pelvis[0], pelvis[1], vertices[:, 2].min()])
     joints = {name: p - ground for name, p in _nite_joints(model, rotation, origin).items()}

@@ -15,19 +15,12 @@ from core.capture.rgbd import RgbdCapture
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 from devices.camera import DEFAULT_FRAMES, DepthCamera, DeviceInfo, PreviewFrame
-from devices.simulator.body import SHAPES
+from devices.simulator.shapes import SHAPES, describe_shape
 
 if TYPE_CHECKING:
     from devices.simulator.patient import SimulatedPatient
     from devices.simulator.truth import SimulatedCapture
 
-_NAMES = {
-    "m_young_avg": "young man",
-    "f_young_avg": "young woman",
-    "m_tall_thin": "tall thin man",
-    "f_old_heavy": "elderly heavy woman",
-    "child10": "child of ten",
-}
 _PREVIEW_WIDTH = 320
 
 
@@ -80,7 +73,7 @@ class SimulatedCamera:
         suffix = f"?seed={self._seed}" if self._seed else ""
         return DeviceInfo(
             f"simulator:{self._shape}{suffix}",
-            f"Simulated patient ({_NAMES[self._shape]})",
+            f"Simulated patient ({describe_shape(self._shape)})",
             "simulator",
             True,
         )

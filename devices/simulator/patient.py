@@ -78,7 +78,7 @@ class SimulatedPatient:
     freckles : int
         Small faint spots that are not moles.
     wardrobe : Wardrobe, optional
-        Default: shorts, and a sports top for women.
+        Default: shorts, and a sports top for women and girls.
     tone : int, optional
         Row of `devices.simulator.skin.TONES`.
     changes : mapping of int to VisitChange
@@ -109,7 +109,9 @@ class SimulatedPatient:
             raise InputError("A simulated patient needs at least one mole and no more lesions than moles.")
         self.model = load_body(shape)
         self.shape, self.seed = shape, seed
-        self.wardrobe: Wardrobe = wardrobe or ("shorts_top" if shape.startswith("f_") else "shorts")
+        self.wardrobe: Wardrobe = wardrobe or (
+            "shorts_top" if shape.startswith("f_") or shape.endswith("_f") else "shorts"
+        )
         self.changes: Mapping[int, VisitChange] = MappingProxyType(dict(changes or {}))
         self.variation = variation or Variation()
         self.room = room or Room()
