@@ -34,6 +34,7 @@ _SHARE_OF_MEMORY: Final = 0.9
 _CONNECT_S: Final = 30
 _NO_WORKER_S: Final = 300
 _LOOK_AGAIN_S: Final = 2.0
+_ATTEMPTS: Final = 4
 
 _LOCAL_SETTINGS: Final = {
     # a pair whose worker died is tried once more
@@ -107,14 +108,7 @@ class DaskRunner:
         self._threads = 0
         self._looked = self._with_workers = time.monotonic()
         self._resources = contextlib.ExitStack()
-        try:
-            client.register_plugin(Preparation(), name=Preparation.name)
-        except Exception as error:
-            # whatever the workers lack: the application, its version, a library of it
-            raise WorkError(
-                f"The workers cannot be prepared ({type(error).__name__}: {error}).",
-                "They need the same GeoDerm, installed in their environment.",
-            ) from error
+        _prepare(client)
         self._look()
 
     @classmethod
@@ -136,24 +130,8 @@ class DaskRunner:
             )
             resources.enter_context(dask.config.set({**_LOCAL_SETTINGS, "temporary-directory": scratch}))
             resources.enter_context(_quiet())
-            try:
-                cluster = resources.enter_context(
-                    LocalCluster(
-                        n_workers=workers,
-                        threads_per_worker=1,
-                        processes=True,
-                        memory_limit=limit,
-                        host="127.0.0.1",
-                        dashboard_address=None,
-                        scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                        silence_logs=logging.CRITICAL,
-                        local_directory=scratch,
-                        env=_ONE_THREAD,
-                    )
-                )
-                client = resources.enter_context(Client(cluster, set_as_default=False))
-            except (OSError, RuntimeError) as error:
-                raise WorkError(f"The worker processes could not be started ({error}).") from error
+            cluster = resources.enter_context(_local_cluster(workers, limit, scratch))
+            client = resources.enter_context(Client(cluster, set_as_default=False))
             runner = cls(client, died)
             runner._resources = resources.pop_all()
         return runner
@@ -248,6 +226,45 @@ class DaskRunner:
             "The connection to the workers broke off.",
             "Start the same command again: it goes on where it stopped.",
         )
+
+
+def _local_cluster(workers: int, memory_bytes: int, scratch: str) -> LocalCluster:
+    for attempt in range(_ATTEMPTS):
+        try:
+            return LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=memory_bytes,
+                host="127.0.0.1",
+                dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+                silence_logs=logging.CRITICAL,
+                local_directory=scratch,
+                env=_ONE_THREAD,
+            )
+        except (OSError, RuntimeError) as error:  # a worker may be killed while it starts, too
+            if attempt + 1 == _ATTEMPTS:
+                raise WorkError(f"The worker processes could not be started ({error}).") from error
+    raise AssertionError("unreachable")
+
+
+def _prepare(client: Client) -> None:
+    """Have every worker prepare itself, those that are there and those to come."""
+    for attempt in range(_ATTEMPTS):
+        try:
+            client.register_plugin(Preparation(), name=Preparation.name)
+        except OSError as error:  # a worker was lost meanwhile; the one that replaces it prepares itself
+            if attempt + 1 == _ATTEMPTS:
+                raise WorkError(f"The workers are lost while they prepare themselves ({error}).") from error
+        except Exception as error:
+            # whatever the workers lack: the application, its version, a library of it
+            raise WorkError(
+                f"The workers cannot be prepared ({type(error).__name__}: {error}).",
+                "They need the same GeoDerm, installed in their environment.",
+            ) from error
+        else:
+            return
 
 
 @contextlib.contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from core.errors import InputError, WorkError
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
     from core.capture import RgbdCapture
-    from core.relocation import LesionQuery, RelocationOptions, RelocationResult
+    from core.relocation import LesionQuery, RelocationOptions, RelocationResult, Spot
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ def relocate_folders(
     start = time.perf_counter()
     queries = read_lesions(lesions)
     first_visit, followup_visit = read_visit(first), read_visit(followup)
-    _check_pixels(lesions, queries, dict(first_visit))
+    check_pixels(lesions, queries, dict(first_visit))
     first_mirrored = mirrored_captures(first, dict(first_visit))
     followup_mirrored = mirrored_captures(followup, dict(followup_visit))
     queries = tuple(query_as_read(query, dict(first_visit), first_mirrored) for query in queries)
@@ -104,14 +104,16 @@ def relocate_folders(
             answers.get(q.id) or RelocatedLesion(q.id, "refused", unusable[str(q.capture)]) for q in queries
         ),
     )
-    document = result.to_json()
-    entries = document["lesions"] if isinstance(document["lesions"], list) else []
-    for entry in entries:
+    document: dict[str, Any] = result.to_json()
+    for entry in document["lesions"]:
         if entry.get("capture") in followup_mirrored:
             entry_as_stored(entry, analysed2[entry["capture"]].capture.rig)
+    _spots_as_stored(document, "new_spots", result.new_spots, analysed2, followup_mirrored)
+    _spots_as_stored(document, "vanished_spots", result.vanished_spots, analysed1, first_mirrored)
     if len(first_visit) == 1 and len(followup_visit) == 1 and not any(q.capture for q in queries):
-        for entry in entries:
-            entry.pop("capture", None)
+        for key in ("lesions", "new_spots", "vanished_spots"):
+            for entry in document.get(key, ()):
+                entry.pop("capture", None)
     document["warnings"] = [*warnings, *result.warnings]
     document["seconds"] = {
         **{name: round(value, 4) for name, value in result.seconds.items() if name != "total"},
@@ -122,7 +124,7 @@ def relocate_folders(
     return RelocatedPair(document, analysed1, analysed2, queries, result)
 
 
-def _check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[str, RgbdCapture]) -> None:
+def check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[str, RgbdCapture]) -> None:
     """Every lesion names a capture and lies inside its image; otherwise the file and the field are named."""
     for i, query in enumerate(queries):
         if query.capture is not None and query.capture not in captures:
@@ -146,6 +148,21 @@ def _check_pixels(file: Path, queries: tuple[LesionQuery, ...], captures: dict[s
                 f'{file}: field "lesions[{i}].{key}": {list(pixel or ())} lies outside the '
                 f"{camera.width} x {camera.height} image."
             )
+
+
+def _spots_as_stored(
+    document: dict[str, Any],
+    key: str,
+    spots: Sequence[Spot],
+    captures: Mapping[str, AnalysedCapture],
+    mirrored: frozenset[str],
+) -> None:
+    """Name the capture of every spot, and count its pixel in the image as it is stored."""
+    for entry, spot in zip(document.get(key, ()), spots, strict=True):
+        name = getattr(spot, "capture", None) or next(iter(captures))
+        entry["capture"] = name
+        if name in mirrored:
+            entry_as_stored(entry, captures[name].capture.rig)
 
 
 def _analyse(captures: list[tuple[str, RgbdCapture]]) -> tuple[dict[str, AnalysedCapture], dict[str, str]]:
