@@ -30,8 +30,8 @@ class Marker:
         Place in image pixels.
     state : str
         confirmed, corrected, marked, proposed, uncertain, removed: its colour (`palette.STATE_COLORS`).
-    radius_px : float or None
-        Radius of the 95 % circle in image pixels; drawn dashed around the proposed place.
+    outline : tuple of (float, float)
+        Border of the 95 % region in image pixels; drawn dashed around the proposed place.
     ghost : (float, float) or None
         The place that was proposed, if the marker was moved away from it.
     tooltip : str
@@ -44,7 +44,7 @@ class Marker:
     x: float
     y: float
     state: str = "marked"
-    radius_px: float | None = None
+    outline: tuple[tuple[float, float], ...] = ()
     ghost: tuple[float, float] | None = None
     tooltip: str = ""
     movable: bool = True

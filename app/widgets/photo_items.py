@@ -1,11 +1,11 @@
-"""The things drawn on a `PhotoView`: markers with their ghost and uncertainty circle, and the scale bar."""
+"""The things drawn on a `PhotoView`: markers with their ghost and region, and the scale bar."""
 
 from __future__ import annotations
 
 import math
 
 from PySide6.QtCore import QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QGraphicsItem, QStyleOptionGraphicsItem, QWidget
 
 from app.theme import palette
@@ -120,6 +120,7 @@ class MarkerItem(QGraphicsItem):
 
     def _place(self) -> None:
         self.prepareGeometryChange()
+        self._region = QPolygonF([QPointF(u + 0.5, v + 0.5) for u, v in self.marker.outline])
         x, y = self._at or (self.marker.x, self.marker.y)
         self._pin.setPos(x + 0.5, y + 0.5)
         gx, gy = self._origin
@@ -130,10 +131,9 @@ class MarkerItem(QGraphicsItem):
 
     def boundingRect(self) -> QRectF:  # noqa: D102
         gx, gy = self._origin
-        r = self.marker.radius_px or 0.0
         x, y = self._pin.pos().x(), self._pin.pos().y()
-        circle = QRectF(gx + 0.5 - r, gy + 0.5 - r, 2 * r, 2 * r)
-        return circle.united(QRectF(QPointF(gx + 0.5, gy + 0.5), QPointF(x, y)).normalized()).adjusted(
+        region = self._region.boundingRect() if self.marker.outline else QRectF(gx + 0.5, gy + 0.5, 0, 0)
+        return region.united(QRectF(QPointF(gx + 0.5, gy + 0.5), QPointF(x, y)).normalized()).adjusted(
             -4, -4, 4, 4
         )
 
@@ -143,7 +143,7 @@ class MarkerItem(QGraphicsItem):
         gx, gy = self._origin
         center = QPointF(gx + 0.5, gy + 0.5)
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        if self.marker.radius_px:
+        if self.marker.outline:
             color = QColor(palette.AMBER)
             fill = QColor(color)
             fill.setAlpha(28)
@@ -151,7 +151,7 @@ class MarkerItem(QGraphicsItem):
             pen = QPen(color, 1.8, Qt.PenStyle.DashLine)
             pen.setCosmetic(True)
             painter.setPen(pen)
-            painter.drawEllipse(center, self.marker.radius_px, self.marker.radius_px)
+            painter.drawPolygon(self._region)
         if self._ghost.isVisible():
             pen = QPen(QColor(palette.AMBER), 1.8, Qt.PenStyle.DotLine)
             pen.setCosmetic(True)

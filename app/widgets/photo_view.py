@@ -4,7 +4,7 @@ Public API of `PhotoView`
 -------------------------
 ``set_image(QImage | ndarray | None)``, ``image_size``, ``set_markers(list[Marker])``, ``markers()``
 ``set_selected(id | None)``, ``selected()``              selection does not emit; clicks do
-``set_placing(bool)``                                    a click on the photo emits ``placed``
+``set_placing(bool, over_markers=False)``                a click on the photo emits ``placed``
 ``set_movable(bool)``                                    markers may be dragged (ghost of the proposed place)
 ``fit()``, ``zoom_by(factor)``, ``center_on(x, y, zoom=None)``, ``center_on_marker(id)``
 ``set_scale_mm(mm_per_pixel | None)``                    draws a scale bar
@@ -89,7 +89,7 @@ class PhotoView(QGraphicsView):
         self._items: dict[str, MarkerItem] = {}
         self._selected: str | None = None
         self._hovered = ""
-        self._placing = False
+        self._placing = self._over_markers = False
         self._movable = False
         self._mm_per_pixel: float | None = None
         self._fitted = True
@@ -169,9 +169,9 @@ class PhotoView(QGraphicsView):
         """Id of the highlighted marker."""
         return self._selected
 
-    def set_placing(self, on: bool) -> None:
-        """Whether a click on the photo emits ``placed``."""
-        self._placing = on
+    def set_placing(self, on: bool, *, over_markers: bool = False) -> None:
+        """Whether a click on the photo emits ``placed``; also one on a marker, if so wished."""
+        self._placing, self._over_markers = on, on and over_markers
         self._update_cursor()
 
     def set_movable(self, on: bool) -> None:
@@ -286,6 +286,8 @@ class PhotoView(QGraphicsView):
     def marker_at(self, position: QPoint) -> str | None:
         """Id of the marker under a viewport position, the nearest one if several are."""
         best: tuple[float, str] | None = None
+        if self._over_markers:
+            return None
         for name, item in self._items.items():
             offset = QPointF(position) - QPointF(self.viewport_position(item.marker.x, item.marker.y))
             distance = item.distance(offset)

@@ -85,7 +85,8 @@ def _summary(
     store: ClinicStore, lesion: Lesion, names: dict[int, str], visits: dict[int, Visit]
 ) -> LesionSummary:
     seen = store.observations.for_lesion(lesion.id)
-    last = seen[-1] if seen else None
+    newest = [o for o in seen if o.visit_id == seen[-1].visit_id]
+    last = max(newest, key=lambda o: (has_place(o), o.id), default=None)
     text = describe(last, lambda user_id: names.get(user_id, "unknown user"))
     removed = lesion.state == "removed"
     placed = [o for o in seen if has_place(o) and o.visit_id in visits]

@@ -433,7 +433,7 @@ class PatientPage(QWidget):
                 f"Lesion {chosen.lesion.number} has no dermoscopic image.", "Attach one during a visit."
             )
             return
-        CompareSheet(self, self._context, chosen.lesion).open()
+        CompareSheet(self, self._context.store, chosen.lesion).open()
 
     @Slot()
     def _edit(self) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.workflows.evidence import VisitEvidence
 from app.workflows.snapshot import VisitSnapshot
 from app.workflows.table import Refused
 from app.workflows.wording import is_confident
@@ -44,6 +45,7 @@ class LesionEdits:
         The records as they are now.
     analysed : callable
         Capture id to its analysis in memory; raises `Refused` if it is not ready.
+    evidence : VisitEvidence
     """
 
     def __init__(
@@ -52,8 +54,10 @@ class LesionEdits:
         by: int,
         snapshot: Callable[[], VisitSnapshot],
         analysed: Callable[[int], AnalysedCapture],
+        evidence: VisitEvidence,
     ) -> None:
         self._store, self._by, self._snapshot, self._analysed = store, by, snapshot, analysed
+        self._evidence = evidence
 
     def pick(self, capture_id: int, pixel: Pixel) -> tuple[Point, tuple[str, ...]]:
         """The skin under a pixel of a capture's picture, with warnings.
@@ -132,7 +136,7 @@ class LesionEdits:
 
     def confident(self) -> list[Observation]:
         """Proposals sure enough to be confirmed together."""
-        return [o for o in self._forces() if is_confident(o)]
+        return [o for o in self._forces() if is_confident(o, self._evidence)]
 
     def unseen(self) -> list[Observation]:
         """Proposals that say the lesion is not in view."""

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from app.workflows.plan import KnownPlace, OutOfView, RelocationPlan, Search
-from core.errors import WorkError
+from app.workflows.evidence import Answer, SeenSpot
+from app.workflows.plan import KnownPlace, OutOfView, RelocationPlan
 from core.progress import Progress, ScaledProgress, no_progress
 from core.records import CandidatePlace, ObservationDraft
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from core.anchors import AnalysedCapture
-    from core.relocation import RelocatedLesion, RelocationResult
-
-EXPLAINED = ("voting-dijkstra", "voting-fmm", "trilateration")
-"""Methods with distances of their own to show; the last one stands for the others."""
-
-_TITLES = {
-    "1-paths-first": "Paths, previous visit",
-    "2-bands": "Bands",
-    "3-votes": "Votes",
-    "4-cluster": "Biggest cluster",
-    "5-paths-followup": "Paths, this visit",
-}
+    from core.relocation import ConfirmedLesion, LesionQuery, RelocatedLesion, Spot
 
 Analyse = Callable[[int, Progress], "AnalysedCapture"]
+Pixel = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SurePlace:
+    """A lesion that the doctor has decided on in this visit: where it was, and where it is."""
+
+    place: KnownPlace
+    capture_id: int
+    pixel: Pixel
 
 
 @dataclass(frozen=True)
@@ -40,16 +35,22 @@ class SearchOutcome:
     Attributes
     ----------
     drafts : tuple of ObservationDraft
-        One per lesion of the plan.
+        At least one per lesion of the plan.
     warnings : tuple of str
         For the doctor.
     seconds : float
         Time the relocation itself took.
+    answers : tuple of Answer
+        Everything the engine said.
+    new_spots, vanished_spots : tuple of SeenSpot
     """
 
     drafts: tuple[ObservationDraft, ...]
     warnings: tuple[str, ...]
     seconds: float
+    answers: tuple[Answer, ...] = ()
+    new_spots: tuple[SeenSpot, ...] = ()
+    vanished_spots: tuple[SeenSpot, ...] = ()
 
 
 def run_plan(
@@ -57,12 +58,15 @@ def run_plan(
     visit_id: int,
     analyse: Analyse,
     *,
-    some_capture_id: int,
+    views: Mapping[str, int],
     numbers: Mapping[int, int],
     method: str | None = None,
+    sure: Sequence[SurePlace] = (),
     progress: Progress = no_progress,
 ) -> SearchOutcome:
     """Look for every lesion of ``plan``. Stores nothing: cancelling leaves no trace.
+
+    Every lesion is looked for in the view that it was seen in first, then in the others that may show it.
 
     Parameters
     ----------
@@ -70,53 +74,117 @@ def run_plan(
     visit_id : int
     analyse : callable
         Capture id and progress to `AnalysedCapture`.
-    some_capture_id : int
-        A capture in force, which carries the note that a lesion's side was not captured.
+    views : mapping of str to int
+        View to capture of this visit that is in force.
     numbers : mapping of int to int
         Lesion id to the number by which the doctor knows it, for warnings.
     method : str or None
         Relocation method; None for the default.
+    sure : sequence of SurePlace
+        Lesions the doctor has decided on: they hold the search of the others.
     progress : Progress
     """
-    from core.relocation import DEFAULT_METHOD, LesionQuery, relocate
+    from core.relocation import DEFAULT_METHOD, relocate_visit
 
-    drafts: list[ObservationDraft] = []
-    warnings: list[str] = []
-    seconds = 0.0
-    for i, search in enumerate(plan.searches):
-        share = ScaledProgress(progress, i / len(plan.searches), (i + 1) / len(plan.searches))
-        first = analyse(search.reference_capture_id, ScaledProgress(share, 0.0, 0.3))
-        followup = analyse(search.target_capture_id, ScaledProgress(share, 0.3, 0.6))
-        result = relocate(
-            first,
-            followup,
-            [LesionQuery(str(numbers[p.lesion_id]), pixel=p.pixel) for p in search.places],
-            method=method or DEFAULT_METHOD,
-            progress=ScaledProgress(share, 0.6, 1.0),
+    unseen = tuple(_unseen(o, visit_id, max(views.values())) for o in plan.out_of_view)
+    if not plan.searches:
+        return SearchOutcome(unseen, (), 0.0)
+    names = {s.reference_capture_id: _name(s.places[0]) for s in plan.searches}
+    wanted = _needed_views(plan, views)
+    total = len(names) + len(wanted)
+    captures: dict[int, AnalysedCapture] = {}
+    for i, capture_id in enumerate((*names, *wanted.values())):
+        captures[capture_id] = analyse(
+            capture_id, ScaledProgress(progress, 0.6 * i / total, 0.6 * (i + 1) / total)
         )
-        drafts += [
-            _draft(place.lesion_id, result[str(numbers[place.lesion_id])], visit_id, search, result)
-            for place in search.places
-        ]
-        warnings += result.warnings
-        seconds += float(result.seconds.get("total", 0.0))
-    drafts += [_unseen(o, visit_id, some_capture_id) for o in plan.out_of_view]
-    return SearchOutcome(tuple(drafts), tuple(dict.fromkeys(warnings)), seconds)
+    places = [p for s in plan.searches for p in s.places]
+    result = relocate_visit(
+        {name: captures[capture_id] for capture_id, name in names.items()},
+        {view: captures[capture_id] for view, capture_id in wanted.items()},
+        [_query(p, names, numbers) for p in places],
+        method=method or DEFAULT_METHOD,
+        confirmed=_confirmed(sure, names, numbers, {c: v for v, c in wanted.items()}),
+        progress=ScaledProgress(progress, 0.6, 1.0),
+    )
+    targets = {p.lesion_id: s.target_capture_id for s in plan.searches for p in s.places}
+    answers = [_answer(p.lesion_id, result[str(numbers[p.lesion_id])], targets, wanted) for p in places]
+    drafts = [_draft(a, visit_id, result.method) for a in answers]
+    drafts += [_elsewhere(a, visit_id, targets[a.lesion_id], wanted) for a in answers if _moved(a, targets)]
+    references = {name: capture_id for capture_id, name in names.items()}
+    return SearchOutcome(
+        (*drafts, *unseen),
+        tuple(dict.fromkeys(result.warnings)),
+        float(result.seconds.get("total", 0.0)),
+        tuple(answers),
+        _spots(result.new_spots, wanted),
+        _spots(result.vanished_spots, references),
+    )
 
 
-def _draft(
-    lesion_id: int, lesion: RelocatedLesion, visit_id: int, search: Search, result: RelocationResult
-) -> ObservationDraft:
+def _name(place: KnownPlace) -> str:
+    return f"{place.view} view of visit {place.visit_number}, capture {place.capture_id}"
+
+
+def _needed_views(plan: RelocationPlan, views: Mapping[str, int]) -> dict[str, int]:
+    """Captures of this visit that may show a lesion of the plan: not those of the opposite side alone."""
+    from core.relocation.views import OPPOSITE
+
+    sides = {s.view for s in plan.searches}
+    targets = {s.target_capture_id for s in plan.searches}
+    return {
+        view: capture_id
+        for view, capture_id in views.items()
+        if capture_id in targets or any(OPPOSITE.get(side) != view for side in sides)
+    }
+
+
+def _query(place: KnownPlace, names: Mapping[int, str], numbers: Mapping[int, int]) -> LesionQuery:
+    from core.relocation import LesionQuery
+
+    return LesionQuery(str(numbers[place.lesion_id]), pixel=place.pixel, capture=names[place.capture_id])
+
+
+def _confirmed(
+    sure: Sequence[SurePlace],
+    names: Mapping[int, str],
+    numbers: Mapping[int, int],
+    view_of: Mapping[int, str],
+) -> dict[tuple[str, str], list[ConfirmedLesion]]:
+    from core.relocation import ConfirmedLesion
+
+    out: dict[tuple[str, str], list[ConfirmedLesion]] = {}
+    for s in sure:
+        if s.place.capture_id in names and s.capture_id in view_of:
+            key = names[s.place.capture_id], view_of[s.capture_id]
+            out.setdefault(key, []).append(ConfirmedLesion(_query(s.place, names, numbers), s.pixel))
+    return out
+
+
+def _answer(
+    lesion_id: int, lesion: RelocatedLesion, targets: Mapping[int, int], views: Mapping[str, int]
+) -> Answer:
+    capture_id = targets[lesion_id]
+    if lesion.point_m is not None and lesion.capture is not None:
+        capture_id = views[lesion.capture]
+    return Answer(lesion_id, capture_id, lesion)
+
+
+def _moved(answer: Answer, targets: Mapping[int, int]) -> bool:
+    return answer.capture_id != targets[answer.lesion_id]
+
+
+def _draft(answer: Answer, visit_id: int, method: str) -> ObservationDraft:
+    lesion = answer.relocated
     return ObservationDraft(
-        lesion_id=lesion_id,
+        lesion_id=answer.lesion_id,
         visit_id=visit_id,
-        capture_id=search.target_capture_id,
+        capture_id=answer.capture_id,
         status=lesion.status,
         pixel=lesion.pixel,
         point_m=None if lesion.point_m is None else tuple(float(x) for x in lesion.point_m),
         radius95_m=lesion.radius95_m,
         confidence=lesion.confidence,
-        method=result.method,
+        method=method,
         reason=lesion.reason,
         appearance_matched=lesion.appearance_matched,
         candidates=tuple(
@@ -125,6 +193,14 @@ def _draft(
             )
             for c in lesion.candidates
         ),
+    )
+
+
+def _elsewhere(answer: Answer, visit_id: int, target_id: int, views: Mapping[str, int]) -> ObservationDraft:
+    """The note on the lesion's own view that another view shows it better."""
+    view = next(name for name, capture_id in views.items() if capture_id == answer.capture_id)
+    return ObservationDraft(
+        answer.lesion_id, visit_id, target_id, "not_visible", reason=f"Found in the {view} view."
     )
 
 
@@ -138,52 +214,8 @@ def _unseen(lesion: OutOfView, visit_id: int, capture_id: int) -> ObservationDra
     )
 
 
-def explanation_pictures(
-    place: KnownPlace,
-    search: Search,
-    analyse: Analyse,
-    *,
-    number: str,
-    method: str,
-    answer_m: tuple[float, float, float] | None,
-    progress: Progress = no_progress,
-) -> dict[str, NDArray[np.uint8]]:
-    """Bands, votes, biggest cluster and geodesic paths of one lesion as RGB pictures, by title.
-
-    Parameters
-    ----------
-    place : KnownPlace
-        Of the earlier visit.
-    search : Search
-        The pair of captures.
-    analyse : callable
-    number : str
-        The lesion's number, written on the pictures.
-    method : str
-        Which method's distances are shown.
-    answer_m : tuple of float or None
-        The place that was proposed.
-    progress : Progress
-    """
-    from core.relocation import LesionQuery
-    from core.relocation.explain import explain_lesion
-    from core.relocation.explain_draw import draw_explanation
-
-    first = analyse(search.reference_capture_id, ScaledProgress(progress, 0.0, 0.3))
-    followup = analyse(search.target_capture_id, ScaledProgress(progress, 0.3, 0.6))
-    progress(0.6, "Tracing the paths")
-    explanation = explain_lesion(
-        first,
-        followup,
-        LesionQuery(number, pixel=place.pixel),
-        method=method if method in EXPLAINED else EXPLAINED[-1],
-        answer_m=None if answer_m is None else np.asarray(answer_m),
+def _spots(spots: Sequence[Spot], captures: Mapping[str, int]) -> tuple[SeenSpot, ...]:
+    return tuple(
+        SeenSpot(captures[getattr(s, "capture", "")], (float(s.pixel[0]), float(s.pixel[1])), s.confidence)
+        for s in spots
     )
-    if explanation is None:
-        raise WorkError(
-            "There is nothing to show for this lesion.",
-            "No anchor reaches its place on both visits; place it by hand.",
-        )
-    progress(0.9, "Drawing")
-    pictures = draw_explanation(explanation, first, followup)
-    return {_TITLES.get(name, name): picture for name, picture in pictures.items()}

@@ -6,25 +6,29 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from app.workflows.analysis import AnalysisCache, NewCapture, Role, TrackerSource, analyse_new
+from app.workflows.analysis import NewCapture, Role, TrackerSource
+from app.workflows.capture_work import CaptureWork
+from app.workflows.evidence import SeenSpot, VisitEvidence
 from app.workflows.first_visit import FIRST_VISIT
 from app.workflows.follow_up import FOLLOW_UP
 from app.workflows.lesion_edits import LesionEdits
+from app.workflows.lesion_search import LesionSearch
 from app.workflows.notifier import Notifier
-from app.workflows.search import SearchOutcome, explanation_pictures, run_plan
+from app.workflows.search import SearchOutcome
 from app.workflows.snapshot import VisitSnapshot
-from app.workflows.table import Event, Refused, State, StateInfo, StateTable
+from app.workflows.table import Event, State, StateInfo, StateTable
 from app.workflows.wording import StatusText, describe
 from core.capture.rgbd import RgbdCapture
 from core.progress import Progress, ScaledProgress, no_progress
-from core.records import AnatomicSite, AnchorRecord, CaptureRecord, DermoscopicImage, Lesion
+from core.records import AnatomicSite, CaptureRecord, DermoscopicImage, Lesion
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from core.anchors import AnalysedCapture, SkeletonCalibration
+    from core.anchors import AnalysedCapture
     from core.records import ClinicStore
+    from core.relocation.site_check import SiteCheck
 
 Pixel = tuple[float, float]
 T = TypeVar("T")
@@ -67,10 +71,10 @@ class VisitSession:
     ) -> None:
         self.store, self.user_id, self.method = store, user_id, method
         self.changed = Notifier()
-        self._tracker = tracker
         self._snapshot = VisitSnapshot.load(store, visit_id)
-        self._cache = AnalysisCache(store.captures.load, tracker)
-        self._edits = LesionEdits(store, user_id, lambda: self._snapshot, self.analysed)
+        self._captures = CaptureWork(store, user_id, tracker, lambda: self._snapshot)
+        self._search = LesionSearch(lambda: self._snapshot, self._captures, method)
+        self._edits = LesionEdits(store, user_id, lambda: self._snapshot, self.analysed, self.evidence)
         self._names: dict[int, str] = {}
         self.table: StateTable = FOLLOW_UP if self._snapshot.is_follow_up else FIRST_VISIT
         self.state: State = self.table.resume(self._snapshot.facts())
@@ -130,7 +134,16 @@ class VisitSession:
 
     def status(self, lesion_id: int) -> StatusText:
         """Status of a lesion in this visit, in words."""
-        return describe(self._snapshot.in_force(lesion_id), self.user_name)
+        return describe(self._snapshot.in_force(lesion_id), self.user_name, self.evidence)
+
+    @property
+    def evidence(self) -> VisitEvidence:
+        """What the searches of this session told beyond the records."""
+        return self._search.evidence
+
+    def spots(self) -> tuple[tuple[SeenSpot, ...], tuple[SeenSpot, ...]]:
+        """Spots seen in this visit only, and in an earlier one only, that are no lesions."""
+        return self._search.spots()
 
     def confident_count(self) -> int:
         """How many proposals may be confirmed together."""
@@ -164,21 +177,11 @@ class VisitSession:
 
     def analyse(self, capture: RgbdCapture, role: Role, progress: Progress = no_progress) -> NewCapture:
         """Worker: find body, joints and anchors of a new capture. Stores nothing."""
-        calibration = None
-        if role == "working":
-            calibration = self._calibration(self._snapshot.visit.id, ScaledProgress(progress, 0.0, 0.3))
-            progress = ScaledProgress(progress, 0.3, 1.0)
-        return analyse_new(capture, role, self._tracker, calibration=calibration, progress=progress)
+        return self._captures.analyse(capture, role, progress)
 
     def store_capture(self, new: NewCapture, progress: Progress = no_progress) -> CaptureRecord:
         """Worker: store an analysed capture and its anchors. Cancelled before the last step: no trace."""
-        record = self.store.captures.add(
-            self.visit_id, new.analysed.capture, new.role, by=self.user_id, progress=progress
-        )
-        self.store.anchors.put(record.id, _anchor_records(new.analysed))
-        self._cache.put(record.id, new.analysed)
-        _warm_up_clicks(new.analysed)
-        return record
+        return self._captures.store(new, progress)
 
     def take_stance(self, capture: RgbdCapture, progress: Progress = no_progress) -> NewCapture:
         """Worker: analyse a psi capture, and store it if the stance is good. Then call `adopt_stance`."""
@@ -214,40 +217,16 @@ class VisitSession:
         self.fire(Event.CAPTURE_STORED)
 
     def analysed(self, capture_id: int) -> AnalysedCapture:
-        """The analysis of a stored capture, from memory.
-
-        Raises
-        ------
-        Refused
-            If it is not ready; `prepare` makes it so.
-        """
-        analysed = self._cache.peek(capture_id)
-        if analysed is None:
-            raise Refused("The body surface is still being prepared.", "Wait a moment and try again.")
-        return analysed
+        """The analysis of a stored capture, from memory; `Refused` if it is not ready."""
+        return self._captures.analysed(capture_id)
 
     def is_ready(self, capture_id: int) -> bool:
         """Whether a stored capture can be clicked on without waiting."""
-        return self._cache.peek(capture_id) is not None
+        return self._captures.is_ready(capture_id)
 
     def prepare(self, capture_id: int, progress: Progress = no_progress) -> AnalysedCapture:
         """Worker: analyse a stored capture of this or an earlier visit, for example after reopening."""
-        record = self._snapshot.captures[capture_id]
-        calibration = None
-        if record.role == "working" and not self.is_ready(capture_id):
-            calibration = self._calibration(record.visit_id, ScaledProgress(progress, 0.0, 0.4))
-            progress = ScaledProgress(progress, 0.4, 1.0)
-        analysed = self._cache.get(capture_id, calibration=calibration, progress=progress)
-        _warm_up_clicks(analysed)
-        return analysed
-
-    def _calibration(self, visit_id: int, progress: Progress) -> SkeletonCalibration | None:
-        from core.anchors import calibrate_skeleton
-
-        stance = self._snapshot.stance_of(visit_id)
-        if stance is None:
-            return None
-        return calibrate_skeleton(self._cache.get(stance.id, progress=progress).skeleton)
+        return self._captures.prepare(capture_id, progress)
 
     # -- finding lesions again ---------------------------------------------------------------------
 
@@ -258,45 +237,36 @@ class VisitSession:
 
     def find_lesions(self, progress: Progress = no_progress) -> SearchOutcome:
         """Worker: look for every pending lesion. Stores nothing; then call `adopt_search`."""
-        views = self._snapshot.views
-        if not views:
-            raise Refused("There is no body capture to look on.", "Take a capture of the body first.")
-        return run_plan(
-            self._snapshot.pending(),
-            self.visit_id,
-            self.prepare,
-            some_capture_id=max(views.values()),
-            numbers={lesion.id: lesion.number for lesion in self._snapshot.lesions},
-            method=self.method,
-            progress=progress,
-        )
+        return self._search.find(progress)
+
+    @property
+    def refinable_count(self) -> int:
+        """Lesions that may be looked for again with the help of those that are decided."""
+        return self._search.waiting_count() if self._search.sure_places() else 0
+
+    def refine_lesions(self, progress: Progress = no_progress) -> SearchOutcome:
+        """Worker: look again for the undecided lesions, held by the decided ones. Then `adopt_search`."""
+        return self._search.refine(progress)
 
     def adopt_search(self, outcome: SearchOutcome) -> None:
-        """Store all places found, or none."""
+        """Store all places found, or none. What a person decided meanwhile stays."""
         self.store.observations.put_many(outcome.drafts, by=self.user_id)
+        self._search.keep(outcome)
         self._edits.set_replaced_aside()
         self.reload()
         self.fire(Event.LESIONS_RELOCATED)
 
-    def explain(self, lesion_id: int, progress: Progress = no_progress) -> dict[str, NDArray[np.uint8]]:
-        """Worker: pictures of how the proposed place of a lesion came about, by title."""
-        for search in self._snapshot.plan().searches:
-            place = next((p for p in search.places if p.lesion_id == lesion_id), None)
-            if place is not None:
-                proposal = self._snapshot.in_force(lesion_id)
-                return explanation_pictures(
-                    place,
-                    search,
-                    self.prepare,
-                    number=str(next(x.number for x in self._snapshot.lesions if x.id == lesion_id)),
-                    method=proposal.method if proposal is not None else "",
-                    answer_m=proposal.proposed_point_m if proposal is not None else None,
-                    progress=progress,
-                )
-        raise Refused(
-            "This lesion was not looked for in this visit, so there is nothing to explain.",
-            "Explanations exist for lesions of earlier visits.",
-        )
+    def explain(
+        self, lesion_id: int, progress: Progress = no_progress
+    ) -> tuple[dict[str, NDArray[np.uint8]], tuple[tuple[str, float], ...]]:
+        """Worker: pictures of how the proposed place of a lesion came about; anchors with spread in m."""
+        return self._search.explain(lesion_id, progress)
+
+    def check_site(
+        self, lesion_id: int, capture_id: int, pixel: Pixel, progress: Progress = no_progress
+    ) -> SiteCheck:
+        """Worker: whether a clicked site of a capture of this visit is that of a lesion. Stores nothing."""
+        return self._search.check_site(lesion_id, capture_id, pixel, progress)
 
     # -- lesions -----------------------------------------------------------------------------------
 
@@ -388,32 +358,3 @@ class VisitSession:
         self.store.visits.discard(self.visit_id, self.user_id)
         self.state = target
         self.changed.notify()
-
-
-def _warm_up_clicks(analysed: AnalysedCapture) -> None:
-    """Make what the first click needs (search trees, compiled kernels), so that it is quick."""
-    from core.surface import pick_skin
-
-    rig = analysed.capture.rig
-    pick_skin(analysed.scan, rig.project_to_picture(analysed.scan.surface.vertices.mean(axis=0))[0])
-
-
-def _anchor_records(analysed: AnalysedCapture) -> list[AnchorRecord]:
-    records = []
-    for anchor in analysed.anchors.anchors:
-        joint = analysed.skeleton.joints.get(anchor.name) or analysed.skeleton.landmarks.get(anchor.name)
-        x, y, z = (float(c) for c in anchor.position_m)
-        records.append(
-            AnchorRecord(
-                anchor.name,
-                x,
-                y,
-                z,
-                None if joint is None else float(joint.pixel[0]),
-                None if joint is None else float(joint.pixel[1]),
-                0.0 if joint is None else float(joint.visibility),
-                float(anchor.sigma_m),
-                analysed.skeleton.source if joint is None else joint.source,
-            )
-        )
-    return records

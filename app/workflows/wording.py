@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
+from app.workflows.evidence import VisitEvidence
 from core.records import Observation
 
 Tone = Literal["confirmed", "corrected", "marked", "proposed", "uncertain", "removed"]
 
 CONFIDENT_RADIUS_M = 0.02
-"""A place may be confirmed together with others only if it is known at least this well (95 %)."""
+"""A place may be confirmed together with others only if its region (95 %) is no larger than this circle."""
+
+CONFIDENT_LENGTH_M = 0.035
+"""And no longer than this (half axis)."""
 
 CONFIDENT = 0.5
 """And believed at least this much."""
@@ -28,21 +32,27 @@ class StatusText:
     needs_doctor: bool = False
 
 
-def is_confident(o: Observation) -> bool:
+def is_confident(o: Observation, evidence: VisitEvidence) -> bool:
     """Whether a proposal is sure enough to be confirmed together with others."""
+    axes = evidence.axes_m(o)
     return (
         o.decision == "proposed"
         and o.pixel is not None
         and o.status in ("found", "predicted")
-        and o.radius95_m is not None
-        and o.radius95_m <= CONFIDENT_RADIUS_M
+        and axes is not None
+        and (axes[0] * axes[1]) ** 0.5 <= CONFIDENT_RADIUS_M
+        and axes[0] <= CONFIDENT_LENGTH_M
         and (o.confidence or 0.0) >= CONFIDENT
+        and evidence.disagreement_m(o) is None
     )
 
 
-def radius_text(radius95_m: float | None) -> str:
-    """For example ``±35 mm``."""
-    return "" if radius95_m is None else f"±{max(1, round(radius95_m * 1000))} mm"
+def region_text(axes_m: tuple[float, float] | None) -> str:
+    """For example ``±35 mm``, or ``±35 x 20 mm`` for a long region (half axes)."""
+    if axes_m is None:
+        return ""
+    a, b = (max(1, round(x * 1000)) for x in axes_m)
+    return f"±{a} mm" if a - b <= max(1, a // 10) else f"±{a} x {b} mm"
 
 
 def when(moment: datetime) -> str:
@@ -50,8 +60,10 @@ def when(moment: datetime) -> str:
     return moment.astimezone().strftime("%d %b %Y, %H:%M")
 
 
-def describe(o: Observation | None, user_name: Callable[[int], str]) -> StatusText:
-    """Put the observation in force of a lesion into words."""
+def describe(
+    o: Observation | None, user_name: Callable[[int], str], evidence: VisitEvidence | None = None
+) -> StatusText:
+    """Put the observation in force of a lesion, and the evidence behind it, into words."""
     if o is None:
         return StatusText(
             "Not looked for yet", "Find the lesions on the body capture first.", "removed", True
@@ -71,11 +83,10 @@ def describe(o: Observation | None, user_name: Callable[[int], str]) -> StatusTe
         if o.pixel is None:
             return StatusText("Not in view", f"Agreed by {who}.", "removed")
         return StatusText("Confirmed", f"Confirmed by {who}.", "confirmed")
-    return _proposal(o)
+    return _proposal(o, evidence or VisitEvidence())
 
 
-def _proposal(o: Observation) -> StatusText:
-    radius = radius_text(o.radius95_m)
+def _proposal(o: Observation, evidence: VisitEvidence) -> StatusText:
     if o.pixel is None:
         label = "Not in view" if o.status == "not_visible" else "No answer"
         return StatusText(
@@ -84,19 +95,26 @@ def _proposal(o: Observation) -> StatusText:
             "uncertain",
             True,
         )
-    if is_confident(o):
+    size = region_text(evidence.axes_m(o))
+    apart = evidence.disagreement_m(o)
+    doubt = (
+        ""
+        if apart is None
+        else f"Distances along the skin point {apart * 1000:.0f} mm away from here: look closely. "
+    )
+    if is_confident(o, evidence):
         seen = "Its look matches the previous visit. " if o.appearance_matched else ""
-        return StatusText(f"Proposed, {radius}", f"{seen}{o.reason}".strip(), "proposed", True)
+        return StatusText(f"Proposed, {size}", f"{seen}{o.reason}".strip(), "proposed", True)
     if o.status == "ambiguous":
         return StatusText(
-            f"Several places fit, {radius}: please check" if radius else "Several places fit: please check",
-            o.reason or "More than one place explains the measurements.",
+            f"Several places, {size}: check" if size else "Several places: check",
+            doubt + (o.reason or "More than one place explains the measurements."),
             "uncertain",
             True,
         )
     return StatusText(
-        f"Proposed, {radius}: please check",
-        f"{o.reason} Expect it within {radius.lstrip('±')} (95 %).".strip(),
+        f"Proposed, {size}: check",
+        f"{doubt}{o.reason} Expect it within {size.lstrip('±')} (95 %).".strip(),
         "uncertain",
         True,
     )

@@ -194,7 +194,7 @@ def test_a_follow_up_by_mouse(open_page: Open, world: World) -> None:
     assert len(ids) == 3
     status = screen.list.item(0, 2).text()
     assert status.startswith("Proposed, ±")
-    assert status.endswith("mm: please check")
+    assert status.endswith("mm: check")
     assert hands.page.lesions.selected_id == ids[0], "the first one that waits is at hand"
 
     hands.click("pane_compare")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QStackedWidget,
 from app.theme import style_class
 from app.widgets.photo_view import PhotoView
 from app.widgets.sheet import Sheet
-from app.windows.visit.lesion_screen import segment
+from app.windows.visit.pieces import segment
 from app.windows.visit.side_panel import wrapped
 
 _TEXT = (
@@ -20,8 +20,21 @@ _TEXT = (
 )
 
 
-def show_explanation(parent: QWidget, number: int, pictures: Mapping[str, NDArray[np.uint8]]) -> Sheet:
-    """Open the sheet with one tab per picture; ``pictures`` maps a tab's title to RGB."""
+def show_explanation(
+    parent: QWidget,
+    number: int,
+    pictures: Mapping[str, NDArray[np.uint8]],
+    anchors: Sequence[tuple[str, float]] = (),
+) -> Sheet:
+    """Open the sheet with one tab per picture.
+
+    Parameters
+    ----------
+    pictures : mapping of str to ndarray (h, w, 3)
+        RGB by the tab's title.
+    anchors : sequence of (str, float)
+        Anchors used, with the spread of each in metres.
+    """
     content = QWidget()
     stack = QStackedWidget()
     tabs = QHBoxLayout()
@@ -51,4 +64,12 @@ def show_explanation(parent: QWidget, number: int, pictures: Mapping[str, NDArra
     sheet = Sheet(parent, f"Lesion {number}: how the place was found", "explain_sheet", width=None)
     sheet.body.addWidget(wrapped(_TEXT, "secondary", "explain_sheet_text"))
     sheet.body.addWidget(content, 1)
+    if anchors:
+        sheet.body.addWidget(wrapped(anchors_text(anchors), "caption", "explain_anchors"))
     return sheet.open()
+
+
+def anchors_text(anchors: Sequence[tuple[str, float]]) -> str:
+    """Every anchor with how far its place may be off, for example ``left hand ±12 mm``."""
+    parts = (f"{name.replace('_', ' ')} ±{max(1, round(1000 * spread))} mm" for name, spread in anchors)
+    return f"Joints used, with the spread of each: {', '.join(parts)}."

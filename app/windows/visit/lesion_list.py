@@ -80,7 +80,7 @@ class LesionList(QTableWidget):
         header.setMinimumSectionSize(40)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.setColumnWidth(0, 44)
-        self.setColumnWidth(2, 280)
+        self.setColumnWidth(2, 288)
         self._quiet = False
         self.itemSelectionChanged.connect(self._on_selection)
         self.itemActivated.connect(lambda item: self.lesion_activated.emit(str(item.data(_ID))))

@@ -11,7 +11,6 @@ from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, QTimer, Signal, 
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QFrame,
     QHBoxLayout,
     QLabel,
     QProgressBar,
@@ -28,7 +27,9 @@ from app.widgets.markers import Marker
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.lesion_details import LesionDetails
 from app.windows.visit.lesion_list import LesionLine, LesionList
+from app.windows.visit.pieces import framed, offer_captures, segment
 from app.windows.visit.side_panel import SidePanel
+from app.windows.visit.spots_panel import SpotsPanel
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
@@ -55,7 +56,11 @@ class LesionScreen(QWidget):
     delete_requested(str)
     capture_chosen(int)
         Another side of the body is to be shown.
-    confirm_all(), accept_unseen(), mark_new(bool), primary_clicked()
+    confirm_all(), accept_unseen(), refine(), mark_new(bool), primary_clicked()
+    spots_toggled(bool)
+        The list of spots seen in one visit only is to be shown, or hidden.
+    show_earlier_capture(int)
+        A capture of an earlier visit is to be shown beside.
     pane_changed(str)
     """
 
@@ -66,6 +71,9 @@ class LesionScreen(QWidget):
     capture_chosen = Signal(int)
     confirm_all = Signal()
     accept_unseen = Signal()
+    refine = Signal()
+    spots_toggled = Signal(bool)
+    show_earlier_capture = Signal(int)
     mark_new = Signal(bool)
     primary_clicked = Signal()
     pane_changed = Signal(str)
@@ -76,6 +84,7 @@ class LesionScreen(QWidget):
         self._analysed: AnalysedCapture | None = None
         self._framed = False
         self._framing = False
+        self._details_on = self._spots_on = False
         self._body_shown: AnalysedCapture | None = None
         self.photo = PhotoView()
         self.photo.setObjectName("lesion_photo")
@@ -98,6 +107,15 @@ class LesionScreen(QWidget):
         self.confirm_all_button.setObjectName("confirm_all")
         self.unseen_button = QPushButton(icon("eye-off", palette.SECONDARY), " Agree: not in view")
         self.unseen_button.setObjectName("accept_unseen")
+        self.refine_button = QPushButton(
+            icon("refresh", palette.SECONDARY), " Use confirmed lesions to refine the others"
+        )
+        self.refine_button.setObjectName("refine_lesions")
+        self.refine_button.setToolTip("Looks again for the lesions that wait, held by those you decided on.")
+        self.spots_button = QPushButton(icon("search", palette.SECONDARY), " Spots only in one visit")
+        self.spots_button.setObjectName("show_spots")
+        self.spots_button.setCheckable(True)
+        self.spots = SpotsPanel()
         self.new_button = QPushButton(icon("plus", palette.SECONDARY), " Mark new lesion")
         self.new_button.setObjectName("mark_new_lesion")
         self.new_button.setCheckable(True)
@@ -112,7 +130,9 @@ class LesionScreen(QWidget):
         self._build()
         self._connect()
         self.set_pane("photo")
-        self.show_details(False)
+        self.refine_button.hide()
+        self.spots_button.hide()
+        self.show_spots(False)
 
     # --- building ------------------------------------------------------------------------------------
 
@@ -142,9 +162,9 @@ class LesionScreen(QWidget):
             segments.addWidget(button)
         tools.addSpacing(8)
         tools.addLayout(segments)
-        self._photo_frame, self.photo_caption = _framed(self.photo, "lesion_photo_caption")
-        self._body_frame, self.body_caption = _framed(self.body, "lesion_body_caption", dark=False)
-        self._previous_frame, self.previous_caption = _framed(self.previous, "previous_photo_caption")
+        self._photo_frame, self.photo_caption = framed(self.photo, "lesion_photo_caption")
+        self._body_frame, self.body_caption = framed(self.body, "lesion_body_caption", dark=False)
+        self._previous_frame, self.previous_caption = framed(self.previous, "previous_photo_caption")
         pictures = QHBoxLayout()
         pictures.setSpacing(16)
         pictures.addWidget(self._previous_frame, 1)
@@ -171,6 +191,9 @@ class LesionScreen(QWidget):
         self.details_area.setWidget(self.details)
         body.addWidget(self.list, 2)
         body.addLayout(bulk)
+        body.addWidget(self.refine_button)
+        body.addWidget(self.spots_button)
+        body.addWidget(self.spots, 4)
         body.addWidget(self.hint)
         body.addWidget(self.details_area, 3)
         row = QHBoxLayout(self)
@@ -193,6 +216,8 @@ class LesionScreen(QWidget):
         self.list.lesion_activated.connect(self.center_on)
         self.confirm_all_button.clicked.connect(self.confirm_all)
         self.unseen_button.clicked.connect(self.accept_unseen)
+        self.refine_button.clicked.connect(self.refine)
+        self.spots_button.toggled.connect(self.spots_toggled)
         self.new_button.toggled.connect(self.mark_new)
         self._panes.idClicked.connect(lambda i: self.set_pane(PANES[i][0]))
         self._captures.idClicked.connect(self.capture_chosen)
@@ -225,17 +250,7 @@ class LesionScreen(QWidget):
 
     def set_captures(self, views: Mapping[str, int], shown: int | None) -> None:
         """Offer the captures of this visit; with one alone there is nothing to choose."""
-        for button in self._captures.buttons():
-            self._captures.removeButton(button)
-            self._capture_row.removeWidget(button)
-            button.deleteLater()
-        if len(views) < 2:
-            return
-        for i, (view, capture_id) in enumerate(views.items()):
-            button = segment(view.capitalize(), f"capture_{view}", first=i == 0, last=i == len(views) - 1)
-            button.setChecked(capture_id == shown)
-            self._captures.addButton(button, capture_id)
-            self._capture_row.addWidget(button)
+        offer_captures(self._captures, self._capture_row, "capture", views, shown)
 
     def show_capture(
         self, picture: NDArray | QImage | None, analysed: AnalysedCapture | None, caption: str
@@ -304,8 +319,17 @@ class LesionScreen(QWidget):
 
     def show_details(self, on: bool) -> None:
         """Whether a lesion is selected whose details are shown."""
-        self.details_area.setVisible(on)
-        self.hint.setVisible(not on)
+        self._details_on = on
+        self.details_area.setVisible(on and not self._spots_on)
+        self.hint.setVisible(not on and not self._spots_on)
+
+    def show_spots(self, on: bool) -> None:
+        """Whether the spots seen in one visit only take the place of the details."""
+        self._spots_on = on
+        with QSignalBlocker(self.spots_button):
+            self.spots_button.setChecked(on)
+        self.spots.setVisible(on)
+        self.show_details(self._details_on)
 
     def show_placing(self, on: bool, *, new: bool) -> None:
         """Whether a click places a lesion, and whether a new one."""
@@ -365,32 +389,3 @@ class LesionScreen(QWidget):
         if self._analysed is not None:
             u, v = self._analysed.capture.rig.project_to_picture([[x, y, z]])[0]
             self.placed.emit(float(u), float(v))
-
-
-def segment(text: str, name: str, *, first: bool, last: bool) -> QPushButton:
-    """One button of a row of which one is chosen."""
-    button = QPushButton(text)
-    button.setObjectName(name)
-    button.setCheckable(True)
-    style_class(button, "segment")
-    set_state(button, "first", "true" if first else "false")
-    set_state(button, "last", "true" if last else "false")
-    return button
-
-
-def _framed(view: QWidget, caption_name: str, *, dark: bool = True) -> tuple[QWidget, QLabel]:
-    holder = QWidget()
-    frame = QFrame()
-    style_class(frame, "photo" if dark else "card")
-    inside = QVBoxLayout(frame)
-    inside.setContentsMargins(1, 1, 1, 1 if dark else 8)
-    inside.addWidget(view)
-    caption = QLabel()
-    caption.setObjectName(caption_name)
-    style_class(caption, "caption")
-    column = QVBoxLayout(holder)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(4)
-    column.addWidget(frame, 1)
-    column.addWidget(caption)
-    return holder, caption

@@ -8,15 +8,26 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Slot
 
+from app.widgets.markers import Marker
 from app.windows.visit.dermoscopy_strip import Thumbnail
 from app.windows.visit.host import VisitHost
 from app.windows.visit.lesion_screen import LesionScreen
 from app.windows.visit.pictures import capture_picture, stored_picture
-from app.windows.visit.shown import body_lesions, earlier_markers, lesion_line, photo_markers
+from app.windows.visit.shown import (
+    CANDIDATE,
+    body_lesions,
+    candidate_markers,
+    earlier_markers,
+    lesion_line,
+    photo_markers,
+)
+from app.windows.visit.spots_corner import SpotsCorner
+from app.workflows.search import SearchOutcome
 from app.workflows.snapshot import has_place
 from app.workflows.table import Event, State
 from app.workflows.wording import when
 from core.progress import Progress
+from core.records import Lesion
 
 
 class LesionStep(QObject):
@@ -34,7 +45,9 @@ class LesionStep(QObject):
         self._previous_id: int | None = None
         self._entered = False
         s = self.screen
-        s.selected.connect(lambda i: self.select(int(i)))
+        s.selected.connect(self._on_marker)
+        s.refine.connect(self._refine)
+        s.show_earlier_capture.connect(self._show_earlier)
         s.placed.connect(self._on_placed)
         s.moved.connect(self._on_moved)
         s.delete_requested.connect(lambda i: self._delete(int(i)))
@@ -45,6 +58,7 @@ class LesionStep(QObject):
         s.primary_clicked.connect(lambda: self._attempt(lambda: self._session.fire(Event.GO_REVIEW)))
         s.pane_changed.connect(lambda _: self._show_previous())
         d = s.details
+        self._spots = SpotsCorner(host, s, self._show_capture, self._mark)
         d.confirm.connect(lambda: self._decide(self._session.confirm))
         d.not_in_view.connect(lambda: self._decide(self._session.not_in_view))
         d.undo.connect(lambda: self._on_selected(self._session.reopen))
@@ -128,7 +142,7 @@ class LesionStep(QObject):
         self._show_picture()
         screen.show_lesions(
             [lesion_line(session, lesion) for lesion in lesions],
-            photo_markers(session, lesions, self._capture_id),
+            self._markers(lesions),
             body_lesions(session, lesions, self._capture_id),
             None if self._selected is None else str(self._selected),
         )
@@ -140,8 +154,13 @@ class LesionStep(QObject):
             f" Confirm all confident ({confident})" if confident else " Confirm all confident"
         )
         screen.confirm_all_button.setToolTip(
-            "Confirms every place known to within 20 mm." if confident else "No place is certain enough."
+            "Confirms every place whose region is no larger than a circle of 20 mm."
+            if confident
+            else "No place is certain enough."
         )
+        refinable = session.refinable_count
+        screen.refine_button.setVisible(follow_up and refinable > 0)
+        screen.refine_button.setText(f" Use confirmed lesions to refine the others ({refinable})")
         screen.unseen_button.setVisible(follow_up and unseen > 0)
         screen.unseen_button.setText(f" Agree: not in view ({unseen})")
         screen.new_button.setVisible(session.state is State.CHECK)
@@ -155,7 +174,18 @@ class LesionStep(QObject):
         )
         self._show_placing()
         self._show_details()
+        self._spots.refresh()
         self._show_previous()
+
+    def _markers(self, lesions: list[Lesion]) -> list[Marker]:
+        """Lesions, the selected one's other places, and the spots while they are listed."""
+        session, capture_id = self._session, self._capture_id
+        chosen = [x for x in lesions if x.id == self._selected]
+        return [
+            *photo_markers(session, lesions, capture_id),
+            *(m for x in chosen for m in candidate_markers(session, x, capture_id)),
+            *self._spots.markers(capture_id),
+        ]
 
     def _show_picture(self) -> None:
         session, capture_id = self._session, self._capture_id
@@ -212,13 +242,19 @@ class LesionStep(QObject):
         if chosen is None:
             self.screen.show_previous([], "There is no previous visit to compare with.")
             return
-        record = snapshot.captures[chosen.capture_id]
+        self._show_earlier(chosen.capture_id)
+
+    @Slot(int)
+    def _show_earlier(self, capture_id: int) -> None:
+        """Show a capture of an earlier visit beside."""
+        session, snapshot = self._session, self._session.snapshot
+        record = snapshot.captures[capture_id]
         if self._previous_id != record.id:
             self._previous_id = record.id
             self.screen.previous.set_image(stored_picture(session.store, record))
-        visit = next(v for v in snapshot.earlier if v.id == record.visit_id)
+        visit = next(v for v in (*snapshot.earlier, snapshot.visit) if v.id == record.visit_id)
         self.screen.show_previous(
-            earlier_markers(session, record.id),
+            [*earlier_markers(session, record.id), *self._spots.markers(record.id)],
             f"Visit {visit.number}, {record.view} view, {when(record.taken_at)}",
         )
         self.screen.previous.set_selected(None if self._selected is None else str(self._selected))
@@ -275,13 +311,39 @@ class LesionStep(QObject):
                 self._warn(warnings)
                 self.refresh()
             return
-        marked = self._attempt(lambda: session.mark(capture_id, (u, v)))
+        self._mark(capture_id, (u, v))
+
+    def _mark(self, capture_id: int, pixel: tuple[float, float]) -> None:
+        """Mark a new lesion and select it."""
+        marked = self._attempt(lambda: self._session.mark(capture_id, pixel))
         if marked is not None:
             lesion, warnings = marked
-            if session.state is State.CHECK:
+            if self._session.state is State.CHECK:
                 self._marking = False
             self.select(lesion.id)
             self._warn(warnings)
+
+    @Slot(str)
+    def _on_marker(self, name: str) -> None:
+        """A lesion was clicked, or another place of one, which then becomes its place."""
+        if name.startswith(CANDIDATE):
+            marker = next((m for m in self.screen.photo.markers() if m.id == name), None)
+            if marker is not None:
+                self._on_moved(name.removeprefix(CANDIDATE).split(":")[0], marker.x, marker.y)
+        elif name.isdigit():
+            self.select(int(name))
+
+    @Slot()
+    def _refine(self) -> None:
+        """Look again for the lesions that wait, in a task that can be cancelled."""
+        self._host.run("Refining the other lesions", self._session.refine_lesions, self._refined)
+
+    def _refined(self, outcome: SearchOutcome) -> None:
+        self._session.adopt_search(outcome)
+        count = len(outcome.answers)
+        self._host.banner.show_success(
+            f"{count} lesion{'s'[: count != 1]} looked for again with the help of the confirmed ones."
+        )
 
     @Slot(str, float, float)
     def _on_moved(self, name: str, u: float, v: float) -> None:

@@ -32,8 +32,8 @@ from app.tasks import TaskFailure
 from app.theme import icon, palette, style_class
 from app.widgets.body_view import BodyView
 from app.widgets.status import MessageBanner, ProgressOverlay, StepBar
+from app.windows.compare_sheet import CompareSheet
 from app.windows.visit.capture_steps import CaptureSteps
-from app.windows.visit.dermoscopy_sheet import show_dermoscopy
 from app.windows.visit.explain_sheet import show_explanation
 from app.windows.visit.lesion_step import LesionStep
 from app.windows.visit.review_step import ReviewStep
@@ -264,9 +264,23 @@ class VisitPage(QWidget):
         return None
 
     def show_dermoscopy(self, lesion_id: int | None, image_id: int) -> None:
-        """Show the dermoscopic images of a lesion."""
-        if lesion_id is not None:
-            self.attempt(lambda: show_dermoscopy(self, self.session, lesion_id, image_id))
+        """Show the dermoscopic images of a lesion; one of this visit may be taken away again."""
+        session = self.session
+        lesion = next((x for x in session.snapshot.lesions if x.id == lesion_id), None)
+        if lesion is not None:
+            may_remove = session.snapshot.visit.is_open
+            sheet = CompareSheet(
+                self,
+                session.store,
+                lesion,
+                chosen=image_id,
+                remove=self._remove_image if may_remove else None,
+                removable_visit=session.visit_id,
+            )
+            sheet.open()
+
+    def _remove_image(self, image_id: int) -> None:
+        self.attempt(lambda: self.session.detach_dermoscopy(image_id))
 
     def explain(self, lesion_id: int) -> None:
         """Show how the proposed place of a lesion came about."""
@@ -274,7 +288,7 @@ class VisitPage(QWidget):
         self.run(
             "Explaining the place",
             lambda progress: self.session.explain(lesion_id, progress),
-            lambda pictures: show_explanation(self, number, pictures),
+            lambda found: show_explanation(self, number, *found),
         )
 
     def attach_dermoscopy(self, paths: list[Path]) -> None:

@@ -5,16 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, QTimer, Signal, Slot
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
-from app.theme import style_class
+from app.theme import icon, palette, style_class
 from app.widgets.markers import Marker
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.lesion_list import LesionLine, LesionList
-from app.windows.visit.lesion_screen import segment
+from app.windows.visit.pieces import offer_captures
 from app.windows.visit.side_panel import SidePanel, field_label
+from app.windows.visit.site_panel import SitePanel
 from app.workflows.table import StateInfo
 
 _SAVE_DELAY_MS = 800
@@ -30,6 +40,9 @@ class ReviewScreen(QWidget):
     note_changed(str)
         A moment after typing.
     selected(str), capture_chosen(int)
+    check_site(bool)
+        The next click on the photo is a site to be checked.
+    site_clicked(float, float)
     """
 
     primary_clicked = Signal()
@@ -37,6 +50,8 @@ class ReviewScreen(QWidget):
     note_changed = Signal(str)
     selected = Signal(str)
     capture_chosen = Signal(int)
+    check_site = Signal(bool)
+    site_clicked = Signal(float, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,7 +59,8 @@ class ReviewScreen(QWidget):
         self._saved = ""
         self.photo = PhotoView()
         self.photo.setObjectName("review_photo")
-        self.photo.marker_clicked.connect(self.selected)
+        self.photo.marker_clicked.connect(lambda name: name.isdigit() and self.selected.emit(name))
+        self.photo.placed.connect(self.site_clicked)
         self.caption = QLabel()
         self.caption.setObjectName("review_photo_caption")
         style_class(self.caption, "caption")
@@ -58,6 +74,11 @@ class ReviewScreen(QWidget):
         self._timer = QTimer(self, singleShot=True, interval=_SAVE_DELAY_MS)
         self._timer.timeout.connect(self.send_note)
         self.note.textChanged.connect(self._timer.start)
+        self.site_button = QPushButton(icon("target", palette.SECONDARY), " Check a site")
+        self.site_button.setObjectName("check_site")
+        self.site_button.setCheckable(True)
+        self.site_button.toggled.connect(self.check_site)
+        self.site = SitePanel()
         self.summary = QLabel()
         self.summary.setObjectName("review_summary")
         self.summary.setWordWrap(True)
@@ -87,6 +108,8 @@ class ReviewScreen(QWidget):
         body = self.panel.body
         body.addWidget(self.summary)
         body.addWidget(self.list, 1)
+        body.addWidget(self.site_button)
+        body.addWidget(self.site)
         body.addWidget(field_label("Note of this visit"))
         body.addWidget(self.note)
         row = QHBoxLayout(self)
@@ -126,15 +149,13 @@ class ReviewScreen(QWidget):
 
     def set_captures(self, views: Mapping[str, int], shown: int | None) -> None:
         """Offer the captures of this visit."""
-        for button in self._captures.buttons():
-            self._captures.removeButton(button)
-            self._capture_row.removeWidget(button)
-            button.deleteLater()
-        for i, (view, capture_id) in enumerate(views.items() if len(views) > 1 else ()):
-            button = segment(view.capitalize(), f"review_{view}", first=i == 0, last=i == len(views) - 1)
-            button.setChecked(capture_id == shown)
-            self._captures.addButton(button, capture_id)
-            self._capture_row.addWidget(button)
+        offer_captures(self._captures, self._capture_row, "review", views, shown)
+
+    def show_checking(self, on: bool) -> None:
+        """Whether the next click on the photo is a site; markers do not catch it then."""
+        self.photo.set_placing(on, over_markers=True)
+        with QSignalBlocker(self.site_button):
+            self.site_button.setChecked(on)
 
     @Slot()
     def send_note(self) -> None:

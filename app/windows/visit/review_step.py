@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QStandardPaths, Signal, Slot
 from PySide6.QtWidgets import QFileDialog
 
+from app.widgets.markers import Marker
 from app.windows.visit.host import VisitHost
 from app.windows.visit.pictures import stored_picture
 from app.windows.visit.review_screen import ReviewScreen
@@ -15,6 +17,10 @@ from app.workflows.snapshot import has_place
 from app.workflows.table import Event, State
 from app.workflows.wording import when
 from core.progress import Progress
+from core.records import Lesion
+
+if TYPE_CHECKING:
+    from core.relocation.site_check import SiteCheck
 
 
 class ReviewStep(QObject):
@@ -42,6 +48,9 @@ class ReviewStep(QObject):
         )
         self.screen.selected.connect(self._on_selected)
         self.screen.capture_chosen.connect(self._on_capture)
+        self.screen.check_site.connect(self._ask_site)
+        self.screen.site_clicked.connect(self._check_site)
+        self._site: tuple[int, float, float] | None = None
 
     def enter(self) -> None:
         """Show the step; called whenever the session changes while it is current."""
@@ -60,7 +69,7 @@ class ReviewStep(QObject):
             screen.show_capture(stored_picture(session.store, record), caption)
         screen.show_lesions(
             [lesion_line(session, lesion) for lesion in lesions],
-            photo_markers(session, lesions, self._capture_id, movable=False),
+            [*photo_markers(session, lesions, self._capture_id, movable=False), *self._site_markers()],
             None if self._selected is None else str(self._selected),
         )
 
@@ -68,6 +77,9 @@ class ReviewStep(QObject):
         """Another step is shown, or the page is left."""
         if self._host.session.state is State.REVIEW:
             self.screen.send_note()
+        self._site = None
+        self.screen.show_checking(False)
+        self.screen.site.hide()
 
     def _summary(self) -> str:
         session = self._host.session
@@ -86,11 +98,60 @@ class ReviewStep(QObject):
 
     @Slot(str)
     def _on_selected(self, name: str) -> None:
+        if int(name) != self._selected:
+            self._site = None
+            self.screen.show_checking(False)
+            self.screen.site.hide()
         self._selected = int(name)
         observation = self._host.session.snapshot.in_force(self._selected)
         if observation is not None and has_place(observation):
             self._capture_id = observation.capture_id
         self.enter()
+
+    # --- the site of a lesion ------------------------------------------------------------------------
+
+    def _site_markers(self) -> list[Marker]:
+        """The site that was clicked, on the capture that shows it."""
+        if self._site is None or self._site[0] != self._capture_id:
+            return []
+        return [Marker("site", "site", self._site[1], self._site[2], "marked", movable=False)]
+
+    @Slot(bool)
+    def _ask_site(self, on: bool) -> None:
+        lesion = self._selected_lesion()
+        if on and lesion is None:
+            self.screen.show_checking(False)
+            self._host.banner.show_info("Which lesion?", "Select a lesion in the list, then check its site.")
+            return
+        self.screen.show_checking(on)
+        self._site = None
+        if on and lesion is not None:
+            self.screen.site.ask(lesion.number)
+        else:
+            self.screen.site.hide()
+        self.enter()
+
+    @Slot(float, float)
+    def _check_site(self, u: float, v: float) -> None:
+        lesion, capture_id = self._selected_lesion(), self._capture_id
+        if lesion is None or capture_id is None:
+            return
+        session = self._host.session
+
+        def checked(check: SiteCheck) -> None:
+            self._site = capture_id, u, v
+            self.screen.site.show_check(lesion.number, check)
+            self.enter()
+
+        self._host.run(
+            "Checking the site",
+            lambda progress: session.check_site(lesion.id, capture_id, (u, v), progress),
+            checked,
+        )
+
+    def _selected_lesion(self) -> Lesion | None:
+        lesions = self._host.session.snapshot.lesions
+        return next((x for x in lesions if x.id == self._selected), None)
 
     @Slot(int)
     def _on_capture(self, capture_id: int) -> None:
