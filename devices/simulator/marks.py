@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,10 +96,16 @@ class Moles:
     ids : tuple of str
         "L01"... for lesions of interest, "M001"... for other moles, "N01"... for moles that came later.
     marks : Marks
+    healed : frozenset of str
+        Those whose pigment is gone.
+    faint : frozenset of str
+        Those that hardly stand out at this visit.
     """
 
     ids: tuple[str, ...]
     marks: Marks
+    healed: frozenset[str] = frozenset()
+    faint: frozenset[str] = frozenset()
 
     @property
     def lesion_ids(self) -> tuple[str, ...]:
@@ -109,15 +115,38 @@ class Moles:
     def without(self, ids: Collection[str]) -> Moles:
         """The other moles."""
         rows = np.array([k for k, name in enumerate(self.ids) if name not in ids], np.int64)
-        return Moles(tuple(self.ids[k] for k in rows), self.marks.take(rows))
+        return replace(self, ids=tuple(self.ids[k] for k in rows), marks=self.marks.take(rows))
 
     def grown(self, growth: Mapping[str, float]) -> Moles:
         """With the radius of some moles multiplied."""
-        return Moles(self.ids, self.marks.enlarged(np.array([growth.get(name, 1.0) for name in self.ids])))
+        factors = np.array([growth.get(name, 1.0) for name in self.ids])
+        return replace(self, marks=self.marks.enlarged(factors))
 
     def joined(self, other: Moles) -> Moles:
         """These moles, then the others."""
-        return Moles(self.ids + other.ids, self.marks.joined(other.marks))
+        return replace(self, ids=self.ids + other.ids, marks=self.marks.joined(other.marks))
+
+    def scarred(self, ids: Collection[str], model: BodyModel, skin: Skin) -> Moles:
+        """With the pigment of some moles gone and a pale, soft patch in its place."""
+        rows = [k for k, name in enumerate(self.ids) if name in ids]
+        marks, faces = self.marks, model.triangles[self.marks.triangle[rows]]
+        pale = np.minimum(skin.albedo[faces].mean(axis=1) * np.array([1.10, 1.14, 1.16]), 0.95)
+        color, core = marks.color.copy(), marks.core.copy()
+        opacity, softness = marks.opacity.copy(), marks.softness.copy()
+        color[rows], core[rows], opacity[rows], softness[rows] = pale, pale, 0.6, 1.0
+        marks = replace(marks, color=color, core=core, opacity=opacity, softness=softness)
+        return replace(self, marks=marks, healed=self.healed | frozenset(ids))
+
+    def faded(self, rng: np.random.Generator, faint_share: float, tan: float) -> Moles:
+        """As they look at one visit: all a little fainter, and a share of them hardly seen."""
+        count = len(self.ids)
+        keep = np.full(count, 1.0 - tan * rng.uniform())
+        faint = rng.uniform(size=count) < faint_share
+        keep[faint] *= rng.uniform(0.08, 0.30, count)[faint]
+        scar = np.array([name in self.healed for name in self.ids])
+        keep[scar] = 1.0
+        ids = frozenset(name for name, hidden in zip(self.ids, faint & ~scar, strict=True) if hidden)
+        return replace(self, marks=replace(self.marks, opacity=self.marks.opacity * keep), faint=ids)
 
 
 def _skin_weight(model: BodyModel, skin: Skin) -> FloatArray:

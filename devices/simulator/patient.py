@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
@@ -18,7 +18,9 @@ from core.capture.transform import RigidTransform
 from core.errors import InputError
 from core.progress import Progress, ScaledProgress, no_progress
 from devices.camera import PreviewFrame
+from devices.simulator.amputation import without_limbs
 from devices.simulator.body import PosedBody, load_body, pose_body, rotation_about
+from devices.simulator.body_hair import grow_hair
 from devices.simulator.dermoscopy import png_of_simulated, render_dermoscopy
 from devices.simulator.figure import skin_slide, with_breath, with_layer, with_weight_change
 from devices.simulator.marks import Moles, areolae, make_moles, scatter_freckles, scatter_moles
@@ -86,6 +88,10 @@ class SimulatedPatient:
     variation : Variation
         What nature varies from capture to capture.
     room : Room
+    missing : collection of str
+        Limbs lost, of `devices.simulator.amputation.LIMBS`, for example "left_forearm".
+    body_hair : float
+        Hair on trunk and limbs: 0 for none to 1 for dense.
     rig : SimulatedRig, optional
         Default: virtual Kinect with the 2560x1920 auxiliary camera.
     """
@@ -103,11 +109,15 @@ class SimulatedPatient:
         changes: Mapping[int, VisitChange] | None = None,
         variation: Variation | None = None,
         room: Room | None = None,
+        missing: Collection[str] = (),
+        body_hair: float = 0.0,
         rig: SimulatedRig | None = None,
     ) -> None:
         if moles < 1 or lesions < 0 or lesions > moles:
             raise InputError("A simulated patient needs at least one mole and no more lesions than moles.")
-        self.model = load_body(shape)
+        if not 0.0 <= body_hair <= 1.0:
+            raise InputError("The body hair of a simulated patient goes from 0 to 1.")
+        self.model = without_limbs(load_body(shape), missing)
         self.shape, self.seed = shape, seed
         self.wardrobe: Wardrobe = wardrobe or (
             "shorts_top" if shape.startswith("f_") or shape.endswith("_f") else "shorts"
@@ -120,6 +130,7 @@ class SimulatedPatient:
         self._texture = scatter_freckles(self.model, self.skin, freckles, self._rng("freckles")).joined(
             areolae(self.model, self.skin, self._rng("areolae"))
         )
+        self._strands = grow_hair(self.model, self.skin, body_hair, self._rng("body hair"))
         self._first_moles = make_moles(self.model, self.skin, moles, lesions, self._rng("moles"))
         self._moles_at_visit = lru_cache(maxsize=16)(self._make_moles)
 
@@ -153,6 +164,13 @@ class SimulatedPatient:
             if unknown:
                 raise InputError(f"There is no mole {', '.join(sorted(unknown))} to grow at visit {number}.")
             moles = moles.grown(change.growth)
+            unknown = set(change.healed) - set(moles.ids)
+            if unknown:
+                raise InputError(f"There is no mole {', '.join(sorted(unknown))} to heal at visit {number}.")
+            moles = moles.scarred(change.healed, self.model, self.skin)
+        natural = self.variation
+        if natural.faint_share > 0 or natural.tan > 0:
+            moles = moles.faded(self._rng("faint", visit), natural.faint_share, natural.tan)
         return moles
 
     def _weight_change(self, visit: int) -> float:
@@ -177,7 +195,7 @@ class SimulatedPatient:
         if not natural.slide:
             return body
         amount = float(np.clip(rng.normal(1.0, 0.2), 0.5, 1.5))
-        field = amount * skin_slide(body, self._rng("slide", stance))
+        field = amount * skin_slide(body, self._rng("slide", stance), natural.torso_slide)
         moved = np.flatnonzero(np.linalg.norm(field, axis=1) > 2e-5)
         if len(moved) == 0:
             return body
@@ -331,7 +349,7 @@ class SimulatedPatient:
             distance_m = framing_distance(standing, self.rig, self.room, height)
         depth_from_world = self.room.depth_from_world(distance_m, height)
         marks = self._texture.joined(self.moles(visit).marks)
-        actors = [Actor(self.model, depth_from_world.apply(standing), self.skin, marks)]
+        actors = [Actor(self.model, depth_from_world.apply(standing), self.skin, marks, self._strands)]
         if self.room.bystander is not None:
             actors.append(self._bystander(self.room.bystander, depth_from_world))
         stage = Stage(actors, self.room.planes(depth_from_world), _LAMP)

@@ -159,4 +159,6 @@ def capture_truth(
         mole_visible_color=in_color,
         mole_visible_depth=in_depth,
         mole_radius_m=marks.radius_m,
+        healed_ids=tuple(sorted(moles.healed)),
+        faint_ids=tuple(sorted(moles.faint)),
     )

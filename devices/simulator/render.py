@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from core.capture.camera import PinholeCamera
 from core.capture.transform import RigidTransform
 from devices.simulator.body import BodyModel
+from devices.simulator.body_hair import hair_cover
 from devices.simulator.skin import linear
 from devices.simulator.stage import Actor, Hits, Stage
 
@@ -175,6 +176,10 @@ def _paint(
     _paint_eyes(person.model, hits.triangle[rows], canonical, albedo)
     if person.marks is not None:
         _paint_marks(person, albedo, canonical, rows, camera, pixels, color_from_depth)
+    if person.strands is not None:
+        mask = hair_cover(person.strands, person.model, person.vertices, camera, color_from_depth)
+        covered = mask.reshape(-1)[pixels[rows]][:, None]
+        albedo += covered * (person.skin.hair_albedo.astype(np.float32) - albedo)
     weave = 1.0 + 0.06 * np.sin(canonical[:, 2:3] * 900.0) * np.sin(canonical[:, :1] * 900.0)
     mix = np.clip(cloth / 0.001 + 0.5, 0.0, 1.0)[:, None]
     albedo += mix * (cover * weave - albedo)

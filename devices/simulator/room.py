@@ -176,6 +176,12 @@ class Variation:
         RMS of the head's sway while the frames are taken.
     weight_share : float
         Standard deviation of the volume between visits, on top of a planned change.
+    torso_slide : bool
+        Whether raised arms draw the skin over shoulder blades and chest muscles, by 5 to 8 mm.
+    faint_share : float
+        Share of the moles that hardly stand out at a visit; another share at the next visit.
+    tan : float
+        By up to which share all moles stand out less at some visits (tanned skin, flat light).
     """
 
     jitter_deg: float = 3.0
@@ -184,7 +190,13 @@ class Variation:
     breath_m: float = 0.004
     sway_m: float = 0.003
     weight_share: float = 0.0
+    torso_slide: bool = False
+    faint_share: float = 0.0
+    tan: float = 0.0
 
+
+DEMANDING = Variation(torso_slide=True, faint_share=0.10, tan=0.25)
+"""What evaluations use: everything that the default varies, sliding torso skin, and moles that fade."""
 
 STILL = Variation(0.0, 0.0, slide=False, breath_m=0.0, sway_m=0.0)
 """A dummy that neither breathes nor sways: for tests."""
@@ -202,9 +214,12 @@ class VisitChange:
         Change of body volume against the first visit, for example 0.05.
     growth : mapping of str to float
         Factor of the radius of some moles.
+    healed : tuple of str
+        Moles, lesions of interest too, whose pigment is gone: a faint pale scar is left in their place.
     """
 
     new_moles: int = 0
     vanished: int = 0
     weight_change: float | None = None
     growth: dict[str, float] = field(default_factory=dict)
+    healed: tuple[str, ...] = ()

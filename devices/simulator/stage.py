@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from core.capture.camera import PinholeCamera
 from core.capture.transform import RigidTransform
 from devices.simulator.body import BodyModel, vertex_normals
+from devices.simulator.body_hair import Strands
 from devices.simulator.marks import Marks
 from devices.simulator.skin import Skin
 
@@ -48,12 +49,15 @@ class Actor:
     vertices : ndarray (n, 3)
     skin : Skin
     marks : Marks or None
+    strands : Strands or None
+        Hair on trunk and limbs.
     """
 
     model: BodyModel
     vertices: FloatArray
     skin: Skin
     marks: Marks | None
+    strands: Strands | None = None
 
 
 @dataclass(frozen=True, eq=False)

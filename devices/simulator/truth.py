@@ -63,6 +63,10 @@ class CaptureTruth:
     mole_visible_color, mole_visible_depth : ndarray (k,) bool
         Not hidden by the body, another person, clothes, hair, the image's border or a glancing angle.
     mole_radius_m : ndarray (k,)
+    healed_ids : tuple of str
+        Moles whose pigment is gone; a pale scar marks the place, and "visible" means that the place is.
+    faint_ids : tuple of str
+        Moles that hardly stand out at this visit.
     """
 
     rig: CameraRig
@@ -81,6 +85,8 @@ class CaptureTruth:
     mole_visible_color: BoolArray
     mole_visible_depth: BoolArray
     mole_radius_m: FloatArray
+    healed_ids: tuple[str, ...] = ()
+    faint_ids: tuple[str, ...] = ()
 
     @property
     def mole_visible(self) -> BoolArray:
@@ -184,6 +190,8 @@ def write_simulated(simulated: SimulatedCapture, folder: Path) -> None:
         "joints_m": {name: list(map(float, p)) for name, p in truth.joints_m.items()},
         "mole_ids": list(truth.mole_ids),
         "lesion_ids": list(truth.lesion_ids),
+        "healed_ids": list(truth.healed_ids),
+        "faint_ids": list(truth.faint_ids),
     }
     (folder / TRUTH_JSON).write_text(json.dumps(text, indent=1), encoding="utf-8")
 
@@ -194,4 +202,11 @@ def read_truth(folder: Path, rig: CameraRig) -> CaptureTruth:
     with np.load(folder / TRUTH_ARRAYS) as arrays:
         values = {name: arrays[name] for name in _ARRAYS}
     joints = {name: np.array(p, float) for name, p in text["joints_m"].items()}
-    return CaptureTruth(rig=rig, joints_m=joints, mole_ids=tuple(text["mole_ids"]), **values)
+    return CaptureTruth(
+        rig=rig,
+        joints_m=joints,
+        mole_ids=tuple(text["mole_ids"]),
+        healed_ids=tuple(text.get("healed_ids", ())),
+        faint_ids=tuple(text.get("faint_ids", ())),
+        **values,
+    )
