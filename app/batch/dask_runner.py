@@ -191,6 +191,8 @@ class DaskRunner:
             return CaseOutcome(case.name, reason=self._died)
         except (CancelledError, OSError) as error:
             raise self._broken() from error
+        except Exception as error:  # noqa: BLE001 - what a worker cannot load or hand back costs its pair alone
+            return CaseOutcome(case.name, reason=f"The worker could not do it ({type(error).__name__}).")
         return outcome
 
     def close(self) -> None:

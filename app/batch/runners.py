@@ -6,7 +6,7 @@ import time
 from typing import Protocol
 
 from app.batch.case import Case, CaseOutcome
-from app.batch.work import prepare_process, run_case
+from app.batch.work import run_case
 
 
 class Runner(Protocol):
@@ -39,7 +39,6 @@ class InProcess:
 
     def __init__(self) -> None:
         self._waiting: list[Case] = []
-        self._prepared = False
 
     def capacity(self) -> int:
         """One."""
@@ -54,9 +53,6 @@ class InProcess:
         if not self._waiting:
             time.sleep(timeout_s)
             return None
-        if not self._prepared:
-            prepare_process()
-            self._prepared = True
         return run_case(self._waiting.pop(0))
 
     def close(self) -> None:

@@ -24,7 +24,6 @@ class Counted(InProcess):
     def __init__(self) -> None:
         super().__init__()
         self.asked: list[str] = []
-        self._prepared = True  # the kernels compile with the first pair; the recordings carry their joints
 
     def submit(self, case: Case) -> None:
         self.asked.append(case.name)
