@@ -1,68 +1,42 @@
-"""Cases for the evaluation, made by the simulated patient and the skeleton tracker."""
+"""Cases for the evaluation, made by the simulated patient and the skeleton tracker.
+
+Rendering a pair takes far longer than relocating in it, so captures can be kept in a folder, truth
+beside them.
+"""
 
 from __future__ import annotations
 
+import json
+import shutil
+import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import asdict, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from core.errors import InputError
+from core.errors import InputError, WorkError
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
-    from core.evaluation import EvaluationCase, TrueLesion
-    from devices.simulator import SimulatedCapture, SimulatedPatient
+    from core.capture import RgbdCapture
+    from core.evaluation import CaseName, EvaluationCase, Joints, PendingCase, TrueLesion, TrueSpots
+    from devices.simulator import CaptureTruth, SimulatedCapture
+    from devices.simulator.cases import SimulatedPair
 
-Joints = Literal["tracked", "true"]
+FloatArray = NDArray[np.float64]
+
 CLICK_ERROR_PX = 1.5
 """Standard deviation of a click on the 2560 x 1920 picture."""
 
+SAME_SKIN_M = 0.004
+"""A picture shows a place if the skin it shows at that pixel is this close to it."""
 
-@dataclass(frozen=True)
-class SimulatedPair:
-    """What to simulate: one patient in two stances."""
-
-    shape: str
-    seed: int
-    first: str
-    followup: str
-    turn_deg: float = 0.0
-
-    @property
-    def group(self) -> str:
-        """Rows of the ladder."""
-        return "same stance" if self.first == self.followup else "other stance"
-
-
-TUNING_PAIRS: tuple[SimulatedPair, ...] = (
-    SimulatedPair("m_young_avg", 1, "psi", "psi"),
-    SimulatedPair("f_old_heavy", 2, "A", "A"),
-    SimulatedPair("child10", 3, "psi", "psi"),
-    SimulatedPair("m_young_avg", 4, "A", "A"),
-    SimulatedPair("f_old_heavy", 5, "psi", "A"),
-    SimulatedPair("child10", 6, "A", "psi"),
-    SimulatedPair("m_young_avg", 7, "psi", "T"),
-    SimulatedPair("f_old_heavy", 8, "psi", "down"),
-    SimulatedPair("child10", 9, "A", "twist"),
-    SimulatedPair("m_young_avg", 10, "psi", "hip_hands", 10.0),
-)
-"""Bodies, stances and seeds that radii and thresholds were chosen on."""
-
-TEST_PAIRS: tuple[SimulatedPair, ...] = (
-    SimulatedPair("m_tall_thin", 11, "psi", "psi"),
-    SimulatedPair("f_young_avg", 12, "A", "A"),
-    SimulatedPair("m_tall_thin", 13, "A", "A"),
-    SimulatedPair("f_young_avg", 14, "psi", "psi"),
-    SimulatedPair("m_tall_thin", 15, "psi", "A"),
-    SimulatedPair("f_young_avg", 16, "A", "psi", 10.0),
-    SimulatedPair("m_tall_thin", 17, "psi", "T"),
-    SimulatedPair("f_young_avg", 18, "psi", "down"),
-    SimulatedPair("m_tall_thin", 19, "A", "twist"),
-    SimulatedPair("f_young_avg", 20, "psi", "hip_hands"),
-)
-"""Bodies and seeds that no parameter was tuned on."""
+FRAMES = 30
+_DONE = "pair.json"
 
 
 class SimulatedCases:
@@ -72,85 +46,206 @@ class SimulatedCases:
     ----------
     pairs : sequence of SimulatedPair
     frames : int
-        Depth frames of each capture.
-    joints : sequence of "tracked" and "true"
-        Kinds of joints; every pair gives one case for each. Truth is only ever used for "true".
-    moles : int
-        Marked lesions and distractors together.
-    lesions : int
+        Depth frames that are rendered; fewer may be asked for when a case is loaded.
+    cache : Path, optional
+        Folder in which captures are kept. A pair in it that was made by another simulator or with other
+        settings is made again.
     """
 
     def __init__(
-        self,
-        pairs: Sequence[SimulatedPair] = TEST_PAIRS,
-        *,
-        frames: int = 30,
-        joints: Sequence[Joints] = ("tracked",),
-        moles: int = 180,
-        lesions: int = 40,
+        self, pairs: Sequence[SimulatedPair], *, frames: int = FRAMES, cache: Path | None = None
     ) -> None:
         if not pairs:
             raise InputError("An evaluation needs at least one pair.")
-        self._pairs, self._frames, self._joints = tuple(pairs), frames, tuple(joints)
-        self._moles, self._lesions = moles, lesions
+        if cache is not None:
+            _make_folder(cache)
+        self._pairs, self._frames, self._cache = tuple(pairs), frames, cache
 
-    def cases(self) -> Iterator[EvaluationCase]:
-        """All cases, one at a time."""
-        from core.evaluation import EvaluationCase
-        from devices.simulator import SimulatedPatient
+    def __len__(self) -> int:
+        return len(self._pairs)
 
+    def cases(self) -> Iterator[PendingCase]:
+        """All pairs, one at a time."""
         for pair in self._pairs:
-            patient = SimulatedPatient(pair.shape, pair.seed, self._moles, lesions=self._lesions)
-            one = patient.capture(pair.first, visit=1, frames=self._frames, seed=100 * pair.seed + 1)
-            two = patient.capture(
-                pair.followup, visit=2, frames=self._frames, seed=100 * pair.seed + 2, turn_deg=pair.turn_deg
-            )
-            lesions = _true_lesions(patient, one, two, pair.seed)
-            for joints in self._joints:
-                yield EvaluationCase(
-                    name=f"{pair.shape} {pair.seed}: {pair.first} to {pair.followup}",
-                    body=f"{pair.shape} {pair.seed}",
-                    group=pair.group,
-                    joints=joints,
-                    first=_analysed(one, joints),
-                    followup=_analysed(two, joints),
-                    lesions=lesions,
+            yield SimulatedCase(pair, self._frames, self._cache)
+
+
+class SimulatedCase:
+    """One pair, rendered or read from the cache when first needed (`core.evaluation.PendingCase`)."""
+
+    def __init__(self, pair: SimulatedPair, frames: int, cache: Path | None) -> None:
+        self._pair, self._frames = pair, frames
+        self._folder = None if cache is None else cache / f"{_slug(pair)}-{frames}f"
+
+    @property
+    def name(self) -> CaseName:
+        """Which pair; a body is a shape, whatever its skin."""
+        from core.evaluation import CaseName
+
+        pair = self._pair
+        return CaseName(_slug(pair), pair.shape, pair.first, pair.followup)
+
+    def load(self, joints: Joints, frames: int) -> EvaluationCase:
+        """Analyse both captures. Truth reaches the analysis only with true joints."""
+        from core.evaluation import EvaluationCase
+
+        one, two = self._captures
+        start = time.perf_counter()
+        first, followup = (_analysed(c, joints, frames) for c in (one, two))
+        seconds = time.perf_counter() - start
+        return EvaluationCase(
+            first=first,
+            followup=followup,
+            lesions=self._lesions,
+            mole_ids=two.truth.mole_ids,
+            moles_m=two.truth.mole_points_m,
+            first_joints_m=one.truth.joints_m,
+            followup_joints_m=two.truth.joints_m,
+            spots=_true_spots(one.truth, two.truth),
+            analysis_seconds=seconds,
+        )
+
+    @cached_property
+    def _captures(self) -> tuple[SimulatedCapture, SimulatedCapture]:
+        if self._folder is None:
+            return _render(self._pair, self._frames)
+        made_by = json.loads(
+            json.dumps({**asdict(self._pair), "frames": self._frames, "simulator": simulator_code()})
+        )
+        if _read_done(self._folder) != made_by:
+            if self._folder.exists():
+                shutil.rmtree(self._folder)
+            _write(_render(self._pair, self._frames), self._folder, made_by)
+        return _read(self._folder / "first"), _read(self._folder / "followup")
+
+    @cached_property
+    def _lesions(self) -> tuple[TrueLesion, ...]:
+        """Lesions that the first capture shows, clicked with an error, and where they truly are.
+
+        Moles that vanish in between are healed sites beside the lesions that heal and leave a scar.
+        """
+        from core.evaluation import TrueLesion
+
+        one, two = (capture.truth for capture in self._captures)
+        rng = np.random.default_rng(self._pair.seed)
+        out = []
+        for i, name in enumerate(one.mole_ids):
+            click = one.mole_pixels[i] + rng.normal(0.0, CLICK_ERROR_PX, 2)
+            gone = name not in two.mole_row
+            healed = gone or name in two.healed_ids
+            if not one.mole_visible[i] or not (healed or name.startswith("L")):
+                continue
+            place = two.position(one.mole_triangle[i], one.mole_barycentric[i])
+            pixel = two.rig.project_to_picture(place)[0]
+            visible = _shows(two, place) if gone else bool(two.mole_visible[two.mole_row[name]])
+            out.append(
+                TrueLesion(
+                    id=name,
+                    pixel=(float(click[0]), float(click[1])),
+                    first_m=one.mole_points_m[i],
+                    followup_m=place,
+                    followup_pixel=(float(pixel[0]), float(pixel[1])),
+                    visible=visible,
+                    healed=healed,
                 )
+            )
+        return tuple(out)
 
 
-def _analysed(simulated: SimulatedCapture, joints: Joints) -> AnalysedCapture:
+def _true_spots(one: CaptureTruth, two: CaptureTruth) -> TrueSpots:
+    """Moles of one visit only that are seen in it, on skin that the other visit shows as well."""
+    from core.evaluation import TrueSpots
+
+    def only_in(here: CaptureTruth, there: CaptureTruth) -> FloatArray:
+        rows = [
+            k
+            for k, name in enumerate(here.mole_ids)
+            if name not in there.mole_row
+            and here.mole_visible[k]
+            and _shows(there, there.position(here.mole_triangle[k], here.mole_barycentric[k]))
+        ]
+        return here.mole_points_m[rows].reshape(-1, 3)
+
+    return TrueSpots(new_m=only_in(two, one), vanished_m=only_in(one, two))
+
+
+def _shows(truth: CaptureTruth, place_m: FloatArray) -> bool:
+    """Whether the picture shows this place of the skin, and the depth camera is not far from doing so."""
+    pixel = truth.rig.project_to_picture(place_m)[0]
+    seen = truth.surface_point_at(pixel) if np.isfinite(pixel).all() else None
+    return seen is not None and float(np.linalg.norm(seen.position_m - place_m)) < SAME_SKIN_M
+
+
+def _analysed(simulated: SimulatedCapture, joints: Joints, frames: int) -> AnalysedCapture:
     from core.anchors import analyse_capture
     from devices.trackers import default_tracker
 
     truth = dict(simulated.truth.joints_m) if joints == "true" else None
-    return analyse_capture(
-        simulated.capture.with_joints(truth), default_tracker(), use_recorded=joints == "true"
-    )
+    capture = some_frames(simulated.capture, frames).with_joints(truth)
+    return analyse_capture(capture, default_tracker(), use_recorded=joints == "true")
 
 
-def _true_lesions(
-    patient: SimulatedPatient, one: SimulatedCapture, two: SimulatedCapture, seed: int
-) -> tuple[TrueLesion, ...]:
-    """Lesions that the first capture shows, clicked with an error, and where they truly are."""
-    from core.evaluation import TrueLesion
+def some_frames(capture: RgbdCapture, count: int) -> RgbdCapture:
+    """The capture with ``count`` frames from its middle; 0 or more than there are: all of them."""
+    total = len(capture.depth_frames)
+    if count == 0 or count >= total:
+        return capture
+    start = (total - count) // 2
+    return replace(capture, depth_frames=capture.depth_frames[start : start + count])
 
-    rng = np.random.default_rng(seed)
-    out = []
-    for name in patient.lesion_ids:
-        i, j = one.truth.mole_row[name], two.truth.mole_row[name]
-        error = rng.normal(0.0, CLICK_ERROR_PX, 2)
-        if not one.truth.mole_visible[i]:
-            continue
-        click = one.truth.mole_pixels[i] + error
-        pixel2 = two.capture.rig.project_to_picture(two.truth.mole_points_m[j])[0]
-        out.append(
-            TrueLesion(
-                id=name,
-                pixel=(float(click[0]), float(click[1])),
-                first_m=one.truth.mole_points_m[i],
-                followup_m=two.truth.mole_points_m[j],
-                followup_pixel=(float(pixel2[0]), float(pixel2[1])),
-                visible=bool(two.truth.mole_visible[j]),
-            )
-        )
-    return tuple(out)
+
+def _render(pair: SimulatedPair, frames: int) -> tuple[SimulatedCapture, SimulatedCapture]:
+    from devices.simulator.cases import make_pair
+
+    _, first, followup = make_pair(pair, frames)
+    return first, followup
+
+
+def _slug(pair: SimulatedPair) -> str:
+    return f"{pair.seed}-{pair.shape}-{pair.first}-{pair.followup}-{pair.view}"
+
+
+@lru_cache(maxsize=1)
+def simulator_code() -> str:
+    """Fingerprint of the program that renders, as it was when first asked for."""
+    import devices.simulator
+    from core.evaluation import code_fingerprint
+
+    return code_fingerprint([Path(devices.simulator.__file__).parent])
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: cannot be made ({error.strerror or error}).", "Choose another."
+        ) from error
+
+
+def _read_done(folder: Path) -> Any:
+    try:
+        return json.loads((folder / _DONE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _write(pair: tuple[SimulatedCapture, SimulatedCapture], folder: Path, made_by: dict[str, Any]) -> None:
+    from devices.simulator import write_simulated
+
+    try:
+        folder.mkdir(parents=True)
+        for capture, name in zip(pair, ("first", "followup"), strict=True):
+            write_simulated(capture, folder / name)
+        # Written last: a pair without it was not finished.
+        (folder / _DONE).write_text(json.dumps(made_by, indent=1), encoding="utf-8")
+    except OSError as error:
+        raise WorkError(f"{folder}: cannot be written ({error.strerror or error}).") from error
+
+
+def _read(folder: Path) -> SimulatedCapture:
+    from core.capture import read_capture
+    from devices.simulator import SimulatedCapture, read_truth
+
+    capture = read_capture(folder)
+    return SimulatedCapture(capture, read_truth(folder, capture.rig))

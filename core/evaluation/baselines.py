@@ -1,4 +1,4 @@
-"""What one gets without geodesics: the yardsticks at the foot of the ladder."""
+"""What the skeleton alone gives, without geodesics: yardsticks at the foot of the ladder."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from core.relocation import MethodContext, MethodOutcome, register_relocation_method
+from core.relocation import MethodContext, MethodOutcome
 from core.relocation.bones import bones, carry, nearest_bone, rigid_fit
 from core.relocation.pair import PickedLesion, VisitPair
-from core.relocation.registry import RelocationMethodFactory
 from core.relocation.types import Estimate
 
 FloatArray = NDArray[np.float64]
@@ -27,12 +26,9 @@ class RigidAlignment:
         self, pair: VisitPair, lesions: Sequence[PickedLesion], context: MethodContext
     ) -> MethodOutcome:
         """One estimate per lesion."""
-        shared = set(pair.followup.skeleton.visible())
-        names = [name for name in pair.first.skeleton.visible() if name in shared]
-        both = [pair.joints_m(name) for name in names]
-        rotation, translation = rigid_fit(np.array([b[0] for b in both]), np.array([b[1] for b in both]))
+        rotation, translation = joint_alignment(pair)
         places = np.array([rotation @ p.point.position_m + translation for p in lesions])
-        return _on_skin(pair, places)
+        return on_skin(pair, places)
 
 
 class NearestBone:
@@ -49,10 +45,18 @@ class NearestBone:
             return MethodOutcome(tuple(Estimate(None, reason="The trunk was not found.") for _ in lesions))
         positions = [np.asarray(p.point.position_m) for p in lesions]
         places = np.array([carry(p, nearest_bone(p, skeleton)) for p in positions])
-        return _on_skin(pair, places)
+        return on_skin(pair, places)
 
 
-def _on_skin(pair: VisitPair, places: FloatArray) -> MethodOutcome:
+def joint_alignment(pair: VisitPair) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and translation (3,) that take the first visit's joints onto the follow-up's best."""
+    shared = set(pair.followup.skeleton.visible())
+    both = [pair.joints_m(name) for name in pair.first.skeleton.visible() if name in shared]
+    return rigid_fit(np.array([b[0] for b in both]), np.array([b[1] for b in both]))
+
+
+def on_skin(pair: VisitPair, places: FloatArray) -> MethodOutcome:
+    """Estimates at the follow-up's skin nearest to places (k, 3), with no radius worth the name."""
     surface = pair.followup.scan.surface
     return MethodOutcome(
         tuple(
@@ -60,15 +64,3 @@ def _on_skin(pair: VisitPair, places: FloatArray) -> MethodOutcome:
             for point in surface.nearest(places)
         )
     )
-
-
-BASELINES: dict[str, RelocationMethodFactory] = {
-    RigidAlignment.name: RigidAlignment,
-    NearestBone.name: NearestBone,
-}
-
-
-def register_baselines() -> None:
-    """Make the baselines known to `core.relocation.relocate`."""
-    for name, factory in BASELINES.items():
-        register_relocation_method(name, factory)

@@ -1,133 +1,217 @@
-"""Errors of answers, and their summaries."""
+"""One answer against the truth."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.evaluation.cases import EvaluationCase
-from core.relocation import LesionStatus, RelocationResult
-from core.surface import pick_skin
+from core.evaluation.cases import EvaluationCase, TrueLesion
+from core.evaluation.parts import BodyMap
+from core.relocation import LesionStatus, Region, RelocatedLesion, RelocationResult, Spot
+from core.surface import BodySurface, pick_skin
 
 FloatArray = NDArray[np.float64]
+
+OWN_LESION_M = 0.005
+"""An answer this close to the truth has chosen the right lesion, whatever lies beside it."""
+
+SPOT_MATCH_M = 0.008
+"""A listed spot is a true one if it lies this close: the radius of the largest mole."""
 
 
 @dataclass(frozen=True)
 class LesionScore:
-    """One answer against the truth.
+    """What became of one lesion. None where there is no answer, or nobody knows.
 
     Attributes
     ----------
+    lesion : str
+    part, limb : str
+        Of the true place in the first capture; empty without joints.
+    visible, healed : bool
+        See `TrueLesion`.
     error_m : float or None
-        Distance to the true place; None without a point.
+        From the answer to the true place.
+    floor_m : float or None
+        From the place that the sensor itself gives for the true pixel to the true place: no relocation can be
+        measured to be better.
+    beside_floor_m : float or None
+        From the answer to the place that the sensor gives.
+    radius95_m, region_a_m, region_b_m : float or None
+        Stated by the method.
+    in_region : bool or None
+        Whether the true place, projected onto the tangent plane of the answer, lies in the stated ellipse.
+    wrong_lesion : bool or None
+        The answer is nearer to another true mole than to its own, and farther than 5 mm from its own.
+    wrong_limb : bool or None
+        See `core.evaluation.parts.BodyMap.is_wrong_limb`.
     """
 
-    body: str
-    status: LesionStatus
+    lesion: str
+    part: str
+    limb: str
     visible: bool
-    error_m: float | None
-    radius95_m: float | None
+    healed: bool
+    status: LesionStatus
+    error_m: float | None = None
+    floor_m: float | None = None
+    beside_floor_m: float | None = None
+    radius95_m: float | None = None
+    region_a_m: float | None = None
+    region_b_m: float | None = None
+    in_region: bool | None = None
+    confidence: float = 0.0
+    appearance_matched: bool = False
+    agreement_m: float | None = None
+    wrong_lesion: bool | None = None
+    wrong_limb: bool | None = None
+
+    @property
+    def answered(self) -> bool:
+        """Whether a place was given."""
+        return self.status not in ("not_visible", "refused")
+
+    def to_json(self) -> dict[str, Any]:
+        """A dictionary of plain values."""
+        return {k: round(v, 6) if isinstance(v, float) else v for k, v in asdict(self).items()}
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> LesionScore:
+        """What `to_json` made."""
+        return cls(**{f.name: values[f.name] for f in fields(cls)})
 
 
 @dataclass(frozen=True)
-class Summary:
-    """A row's figures, over the visible lesions unless named otherwise.
+class SpotScore:
+    """New or vanished spots of one case: how many were listed, how many there are, how many are both."""
 
-    Attributes
+    listed: int
+    true: int
+    right: int
+
+
+def score_lesions(
+    case: EvaluationCase, result: RelocationResult, lesions: Sequence[TrueLesion] | None = None
+) -> list[LesionScore]:
+    """Compare a result with the truth of its case.
+
+    Parameters
     ----------
-    lesions, answered : int
-        Visible lesions, and how many of them got a point.
-    mean_mm, median_mm, p95_mm : float
-        Of the error of answers; NaN without any.
-    mean_low_mm, mean_high_mm : float
-        95 % bootstrap interval of the mean, re-sampling bodies.
-    within_10mm, within_radius : float
-        Shares of the answers.
-    beyond_100mm : int
-    hidden, hidden_said : int
-        Lesions that the follow-up does not show, and for how many that was said.
+    lesions : sequence of TrueLesion, optional
+        Those that were asked for; all by default.
     """
-
-    lesions: int
-    answered: int
-    mean_mm: float
-    median_mm: float
-    p95_mm: float
-    mean_low_mm: float
-    mean_high_mm: float
-    within_10mm: float
-    beyond_100mm: int
-    within_radius: float
-    hidden: int
-    hidden_said: int
-
-
-def score_lesions(case: EvaluationCase, result: RelocationResult) -> list[LesionScore]:
-    """Compare a result with the truth of its case."""
-    out = []
-    for truth in case.lesions:
-        answer = result[truth.id]
-        error = None
-        if answer.point_m is not None:
-            error = float(np.linalg.norm(answer.point_m - truth.followup_m))
-        out.append(LesionScore(case.body, answer.status, truth.visible, error, answer.radius95_m))
-    return out
+    first, followup = BodyMap(case.first_joints_m), BodyMap(case.followup_joints_m)
+    return [
+        _score(case, truth, result[truth.id], first, followup)
+        for truth in (case.lesions if lesions is None else lesions)
+    ]
 
 
 def sensor_floor(case: EvaluationCase) -> list[LesionScore]:
-    """Error of the clicked true pixel's own place: no relocation can be measured to be better."""
+    """The true pixel's own place as if it were an answer, for every lesion the follow-up shows."""
+    first = BodyMap(case.first_joints_m)
     out = []
     for truth in case.lesions:
         if not truth.visible:
             continue
-        pick = pick_skin(case.followup.scan, truth.followup_pixel)
-        error = None
-        if pick.point is not None:
-            error = float(np.linalg.norm(pick.point.position_m - truth.followup_m))
-        out.append(LesionScore(case.body, "found", True, error, None))
+        sensed = _sensed(case, truth)
+        floor = None if sensed is None else _between(sensed, truth.followup_m)
+        part, limb = _names(first, truth)
+        status: LesionStatus = "refused" if sensed is None else "found"
+        out.append(
+            LesionScore(truth.id, part, limb, True, truth.healed, status, error_m=floor, floor_m=floor)
+        )
     return out
 
 
-def summarise(scores: Sequence[LesionScore], *, seed: int = 0, draws: int = 500) -> Summary:
-    """Figures of one row."""
-    seen = [s for s in scores if s.visible]
-    hidden = [s for s in scores if not s.visible]
-    answered = [s for s in seen if s.error_m is not None]
-    errors = 1000.0 * np.array([s.error_m for s in answered if s.error_m is not None])
-    radii = [
-        s.error_m <= s.radius95_m for s in answered if s.error_m is not None and s.radius95_m is not None
-    ]
-    low, high = _body_interval(answered, seed, draws)
-    some = len(errors) > 0
-    return Summary(
-        lesions=len(seen),
-        answered=len(errors),
-        mean_mm=float(errors.mean()) if some else float("nan"),
-        median_mm=float(np.median(errors)) if some else float("nan"),
-        p95_mm=float(np.percentile(errors, 95)) if some else float("nan"),
-        mean_low_mm=low,
-        mean_high_mm=high,
-        within_10mm=float((errors < 10.0).mean()) if some else float("nan"),
-        beyond_100mm=int((errors > 100.0).sum()),
-        within_radius=float(np.mean(radii)) if radii else float("nan"),
-        hidden=len(hidden),
-        hidden_said=sum(s.error_m is None for s in hidden),
+def score_spots(listed: Sequence[Spot], true_m: FloatArray) -> SpotScore:
+    """Spots against the true ones of their capture.
+
+    A true spot counts once, for the nearest listed one within `SPOT_MATCH_M`.
+    """
+    if not listed or not len(true_m):
+        return SpotScore(len(listed), len(true_m), 0)
+    away = np.linalg.norm(np.array([s.point_m for s in listed])[:, None] - true_m[None], axis=2)
+    rows: set[int] = set()
+    columns: set[int] = set()
+    for row, column in sorted(np.argwhere(away <= SPOT_MATCH_M).tolist(), key=lambda rc: away[rc[0], rc[1]]):
+        if row not in rows and column not in columns:
+            rows.add(row)
+            columns.add(column)
+    return SpotScore(len(listed), len(true_m), len(rows))
+
+
+def _score(
+    case: EvaluationCase, truth: TrueLesion, answer: RelocatedLesion, first: BodyMap, followup: BodyMap
+) -> LesionScore:
+    part, limb = _names(first, truth)
+    known = LesionScore(
+        lesion=truth.id,
+        part=part,
+        limb=limb,
+        visible=truth.visible,
+        healed=truth.healed,
+        status=answer.status,
+        confidence=float(answer.confidence),
+        appearance_matched=answer.appearance_matched,
+        agreement_m=None if answer.agreement_m is None else float(answer.agreement_m),
+    )
+    if answer.point_m is None or not np.isfinite(truth.followup_m).all():
+        return known
+    point = np.asarray(answer.point_m, float)
+    sensed = _sensed(case, truth) if truth.visible else None
+    region = answer.region
+    return replace(
+        known,
+        error_m=_between(point, truth.followup_m),
+        floor_m=None if sensed is None else _between(sensed, truth.followup_m),
+        beside_floor_m=None if sensed is None else _between(sensed, point),
+        radius95_m=None if answer.radius95_m is None else float(answer.radius95_m),
+        region_a_m=None if region is None else float(region.axes_m[0]),
+        region_b_m=None if region is None else float(region.axes_m[1]),
+        in_region=None
+        if region is None
+        else is_in_region(truth.followup_m, point, region, case.followup.scan.surface),
+        wrong_lesion=_wrong_lesion(case, truth, point),
+        wrong_limb=followup.is_wrong_limb(point, truth.followup_m),
     )
 
 
-def _body_interval(scores: Sequence[LesionScore], seed: int, draws: int) -> tuple[float, float]:
-    """95 % interval of the mean error in millimetres, bodies drawn with replacement."""
-    by_body: dict[str, list[float]] = {}
-    for s in scores:
-        if s.error_m is not None:
-            by_body.setdefault(s.body, []).append(1000.0 * s.error_m)
-    if not by_body:
-        return float("nan"), float("nan")
-    sums = np.array([[sum(e), len(e)] for e in by_body.values()])
-    drawn = np.random.default_rng(seed).integers(0, len(sums), (draws, len(sums)))
-    totals = sums[drawn].sum(axis=1)
-    low, high = np.percentile(totals[:, 0] / totals[:, 1], [2.5, 97.5])
-    return float(low), float(high)
+def is_in_region(place_m: FloatArray, center_m: FloatArray, region: Region, surface: BodySurface) -> bool:
+    """Whether a place, projected onto the tangent plane of the region's centre, lies in its ellipse."""
+    normal = surface.normal_at(surface.nearest(center_m)[0])
+    off = place_m - center_m
+    off = off - normal * (normal @ off)
+    long = region.direction - normal * (normal @ region.direction)
+    long = long / max(float(np.linalg.norm(long)), 1e-12)
+    across = np.cross(normal, long)
+    a, b = (max(axis, 1e-9) for axis in region.axes_m)
+    return bool((float(off @ long) / a) ** 2 + (float(off @ across) / b) ** 2 <= 1.0)
+
+
+def _wrong_lesion(case: EvaluationCase, truth: TrueLesion, answer_m: FloatArray) -> bool | None:
+    others = np.array([name != truth.id for name in case.mole_ids], bool)
+    if not others.any():
+        return None
+    own = _between(answer_m, truth.followup_m)
+    nearest = float(np.linalg.norm(case.moles_m[others] - answer_m, axis=1).min())
+    return own > OWN_LESION_M and nearest < own
+
+
+def _sensed(case: EvaluationCase, truth: TrueLesion) -> FloatArray | None:
+    """The place that the sensor gives for the lesion's true pixel."""
+    point = pick_skin(case.followup.scan, truth.followup_pixel).point
+    return None if point is None else np.asarray(point.position_m, float)
+
+
+def _names(first: BodyMap, truth: TrueLesion) -> tuple[str, str]:
+    place = first.place(truth.first_m)
+    return ("", "") if place is None else (place.part, place.limb)
+
+
+def _between(a: FloatArray, b: FloatArray) -> float:
+    return float(np.linalg.norm(a - b))
