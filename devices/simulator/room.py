@@ -195,7 +195,7 @@ class Variation:
     tan: float = 0.0
 
 
-DEMANDING = Variation(torso_slide=True, faint_share=0.10, tan=0.25)
+DEMANDING = Variation(torso_slide=True, faint_share=0.06, tan=0.25)
 """What evaluations use: everything that the default varies, sliding torso skin, and moles that fade."""
 
 STILL = Variation(0.0, 0.0, slide=False, breath_m=0.0, sway_m=0.0)
