@@ -41,6 +41,8 @@ class Looks:
         Log-contrast of the core against the median of the surroundings.
     closed : ndarray (n,)
         Second smallest contrast of all directions over `contrast`: 1 for a spot, 0 for a line or border.
+    tail : ndarray (n,)
+        1 minus the smallest contrast of any single direction over `contrast`: the ends of hairs have one.
     across : ndarray (n,)
         Smallest contrast against two opposite directions together, over `contrast`: 0 only for a line.
     rough : ndarray (n,)
@@ -55,6 +57,7 @@ class Looks:
     radius: FloatArray
     contrast: FloatArray
     closed: FloatArray
+    tail: FloatArray
     across: FloatArray
     rough: FloatArray
     fill: FloatArray
@@ -105,7 +108,7 @@ def darker_all_round(
 
 
 def measure_blobs(picture: BodyPicture, places: FloatArray, radius: FloatArray, axes: FloatArray) -> Looks:
-    """Centre, size and contrast of blobs at crop pixels (n, 2), round in ``axes`` (n, 2, 2).
+    """Centre, size and contrast of at least one blob at crop pixels (n, 2), round in ``axes`` (n, 2, 2).
 
     ``radius`` (n,) is a first guess of the longer half-axis in crop pixels.
     """
@@ -126,6 +129,7 @@ def measure_blobs(picture: BodyPicture, places: FloatArray, radius: FloatArray, 
     rings = _sample(picture.darkness, places, radius, axes)
     core = rings[:, :, _INNER].mean(axis=(1, 2))
     outer = np.median(rings[:, :, _OUTER], axis=2)
+    darkest = outer.max(axis=1)
     outer = (outer + np.roll(outer, 1, axis=1) + np.roll(outer, -1, axis=1)) / 3.0
     towards = core[:, None] - outer
     contrast = np.median(towards, axis=1)
@@ -143,8 +147,9 @@ def measure_blobs(picture: BodyPicture, places: FloatArray, radius: FloatArray, 
         radius=radius * _half_radius(rings - level[:, None, None]),
         contrast=contrast,
         closed=np.sort(towards, axis=1)[:, 1] / scale,
+        tail=1.0 - (core - darkest) / scale,
         across=both.min(axis=1) / scale,
-        rough=1.4826 * np.median(np.abs(ring - smooth).reshape(len(ring), -1), axis=1) / scale,
+        rough=1.4826 * np.median(np.abs(ring - smooth), axis=(1, 2)) / scale,
         fill=(within.mean(axis=1) @ weight) / weight.sum() / np.maximum(core - level, 1e-3),
         color=color,
         skin_color=skin_color,
@@ -174,8 +179,6 @@ def _remap(image: NDArray[np.generic], grid: Image) -> NDArray[np.generic]:
 
 
 def _sample(darkness: Image, places: FloatArray, radius: FloatArray, axes: FloatArray) -> Image:
-    if len(places) == 0:
-        return np.zeros((0, _ANGLES, len(_RINGS)), np.float32)
     return np.asarray(_remap(darkness, _grid(places, radius, axes, _RINGS)), np.float32)
 
 
@@ -216,11 +219,9 @@ def _half_radius(dark: Image) -> FloatArray:
 def _colors(
     rgb: NDArray[np.uint8], places: FloatArray, radius: FloatArray, axes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    if len(places) == 0:
-        return np.zeros((0, 3)), np.zeros((0, 3))
     rings = np.concatenate([_RINGS[_INNER], _RINGS[_OUTER]])
     grid = _grid(places, radius, axes, rings)[:, _COLOR_ANGLES]
     values = _remap(rgb, grid).astype(float)
     inner = int(_INNER.sum())
-    around = np.median(values[:, :, inner:].reshape(len(values), -1, 3), axis=1)
+    around = np.median(values[:, :, inner:], axis=(1, 2))
     return values[:, :, :inner].mean(axis=(1, 2)), around

@@ -172,7 +172,7 @@ def strongest_only(places: FloatArray, radius: FloatArray, similar: float = np.i
     """
     if len(places) < 2:
         return np.ones(len(places), np.bool_)
-    reach = np.maximum(1.5, 0.8 * radius)
+    reach = np.maximum(2.0, 0.9 * radius)
     pairs = np.sort(cKDTree(places).query_pairs(float(reach.max()), output_type="ndarray"), axis=1)
     one, two = pairs.T
     apart = np.linalg.norm(places[one] - places[two], axis=1)

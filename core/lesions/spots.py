@@ -88,18 +88,18 @@ def detect_spots(scan: BodyScan) -> SkinSpots:
     guess = blobs.radius / np.sqrt(np.linalg.norm(axes[:, 1], axis=1))
     per_px = picture.shrink * to_color.apply(points)[:, 2] / camera.fx
     rows = np.flatnonzero(darker_all_round(picture, blobs.places, guess, axes))
+    if len(rows) == 0:
+        return SkinSpots.none()
     blobs, guess, axes, per_px, points = blobs.take(rows), guess[rows], axes[rows], per_px[rows], points[rows]
     looks = measure_blobs(picture, blobs.places, guess, axes)
     confidence = _judge(scan, picture, looks, blobs.noises, per_px, points)
-    rows = np.flatnonzero((confidence >= _LEAST_CONFIDENCE) & (looks.contrast > 0))
-    rows = rows[np.argsort(-confidence[rows], kind="stable")]
-    rows = rows[strongest_only(looks.places[rows], looks.radius[rows])]
+    rows = _clearest(looks, confidence)
+    if len(rows) == 0:
+        return SkinSpots.none()
     # Once more from the better start, which makes the centres independent of where the blobs were found.
     looks = measure_blobs(picture, looks.places[rows], looks.radius[rows], axes[rows])
     confidence = _judge(scan, picture, looks, blobs.noises[rows], per_px[rows], points[rows])
-    rows = np.flatnonzero((confidence >= _LEAST_CONFIDENCE) & (looks.contrast > 0))
-    rows = rows[np.argsort(-confidence[rows], kind="stable")]
-    rows = rows[strongest_only(looks.places[rows], looks.radius[rows])]
+    rows = _clearest(looks, confidence)
     pixels = picture.to_picture(looks.places[rows])
     lifted = lift_pixels(scan, pixels)
     radius_px = looks.radius[rows] * picture.shrink
@@ -117,6 +117,13 @@ def detect_spots(scan: BodyScan) -> SkinSpots:
         skin_color=looks.skin_color[rows],
     )
     return spots.take(lifted.on_skin)
+
+
+def _clearest(looks: Looks, confidence: FloatArray) -> NDArray[np.int64]:
+    """Rows of the acceptable blobs, most mole-like first, each spot once."""
+    rows = np.flatnonzero((confidence >= _LEAST_CONFIDENCE) & (looks.contrast > 0))
+    rows = rows[np.argsort(-confidence[rows], kind="stable")]
+    return rows[strongest_only(looks.places[rows], looks.radius[rows])]
 
 
 def _judge(
