@@ -10,6 +10,7 @@ import numpy as np
 
 from core.errors import WorkError
 from core.evaluation.cases import OTHER, SAME
+from core.evaluation.parts import PARTS
 from core.evaluation.records import FLOOR, Record, Rung
 from core.evaluation.summaries import scored
 from core.evaluation.tables import LadderRow, detailed_rungs
@@ -36,6 +37,7 @@ _LINES = (
     "#b5651d",
 )
 _DPI = 120
+_LEAST_LESIONS = 5
 
 
 def draw_plots(
@@ -203,41 +205,43 @@ def _stances(report: LadderReport, rung: Rung) -> Figure | None:
 
 def _coverage(report: LadderReport, rung: Rung) -> Figure | None:
     """Share of true places within the stated 95 % radius, by stance class and body part."""
-    rows = [r for r in report.parts if r.rung == rung and r.summary.in_radius.value >= 0]
+    rows = [
+        r
+        for r in report.parts
+        if r.rung == rung and r.summary.in_radius.value >= 0 and r.summary.lesions >= _LEAST_LESIONS
+    ]
     if not rows:
         return None
-    parts = [p for p in dict.fromkeys(r.part for r in rows) if p != "all"] + ["all"]
-    figure, (ax,) = _figure(9.0, 4.6)
+    parts = list(dict.fromkeys(r.part for r in sorted(rows, key=lambda r: (*PARTS, "all").index(r.part))))
+    figure, (ax,) = _figure(10.0, 4.8)
     ax.axhspan(93.0, 97.0, color="#cfe8d5", zorder=0)
     for k, group in enumerate((SAME, OTHER)):
         some = {r.part: r.summary for r in rows if r.group == group}
-        for i, part in enumerate(parts):
-            if part not in some:
-                continue
-            s = some[part].in_radius
-            spread = 100.0 * np.array([[max(0.0, s.value - s.low)], [max(0.0, s.high - s.value)]])
-            ax.errorbar(
-                i + 0.24 * (k - 0.5),
-                100.0 * s.value,
-                yerr=spread,
-                fmt=_MARKS[group],
-                color=_COLORS[group],
-                capsize=3,
-                label=group if i == next(n for n, p in enumerate(parts) if p in some) else None,
-            )
-            ax.annotate(
-                f"{some[part].radius_mm:.0f} mm",
-                (i + 0.24 * (k - 0.5), 100.0 * s.value),
-                xytext=(6, -9),
-                textcoords="offset points",
-                fontsize=7,
-                color=_COLORS[group],
-            )
-    ax.set_xticks(range(len(parts)), parts)
-    ax.set_xlim(-0.6, len(parts) - 0.3)
-    ax.set_ylabel("true place within the stated 95 % radius, %", color=_INK)
-    ax.set_title(
-        f"Coverage, with median radii: {rung.label}, {rung.conditions}", loc="left", color=_INK, fontsize=11
-    )
-    ax.legend(fontsize=9, frameon=False, loc="best")
+        shares = {part: s.in_radius for part, s in some.items()}
+        if not shares:
+            continue
+        values = 100.0 * np.array([s.value for s in shares.values()])
+        low = 100.0 * np.array([s.low for s in shares.values()])
+        high = 100.0 * np.array([s.high for s in shares.values()])
+        ax.errorbar(
+            [parts.index(part) + 0.24 * (k - 0.5) for part in shares],
+            values,
+            yerr=[np.maximum(0.0, values - low), np.maximum(0.0, high - values)],
+            fmt=_MARKS[group],
+            color=_COLORS[group],
+            capsize=3,
+            label=group,
+        )
+    labels = []
+    for part in parts:
+        own = [next((r.summary for r in rows if (r.part, r.group) == (part, g)), None) for g in (SAME, OTHER)]
+        radii = " | ".join("-" if s is None else f"{s.radius_mm:.0f} mm" for s in own)
+        counts = " | ".join("-" if s is None else f"{s.lesions}" for s in own)
+        labels.append(f"{part}\n{radii}\n{counts}")
+    ax.set_xticks(range(len(parts)), labels)
+    ax.set_xlim(-0.6, len(parts) - 0.4)
+    ax.set_xlabel(f"median radius and lesions, {SAME} | {OTHER}; parts with 5 lesions or more", color=_INK)
+    ax.set_ylabel("within the stated 95 % radius, %", color=_INK)
+    ax.set_title(f"Coverage: {rung.label}, {rung.conditions}", loc="left", color=_INK, fontsize=11)
+    ax.legend(fontsize=9, frameon=False, loc="lower left")
     return figure

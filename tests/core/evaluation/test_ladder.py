@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.cli.evaluate import simulated_pairs, write_all
+from app.cli.main import main
 from app.cli.simulated_cases import SimulatedCases
 from core.errors import InputError
 from core.evaluation import (
@@ -110,6 +111,51 @@ def test_the_report_has_pictures_for_people_and_json_for_programs(records, folde
     assert all(f.stat().st_size > 500 for f in files)
     rows = json.loads((out / "ladder.json").read_text())["rows"]
     assert {row["method"] for row in rows} == set(records)
+
+
+@pytest.fixture
+def study(folder, source, records, tmp_path):
+    """A manifest of the same captures, with the true pixels as somebody would have clicked them."""
+    case = next(iter(source.cases())).load("true", 1)
+    captures = next((folder / "captures").iterdir())
+    seen = [lesion for lesion in case.lesions if not lesion.healed][:8]
+    write = {
+        "lesions": [{"id": x.id, "pixel": x.pixel} for x in seen],
+        "truth": [
+            {"id": x.id, "pixel": x.followup_pixel} if x.visible else {"id": x.id, "visible": False}
+            for x in seen
+        ],
+    }
+    for name, entries in write.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps({"lesions": entries}))
+    (tmp_path / "manifest.csv").write_text(
+        "case,first,followup,lesions,truth,body\n"
+        f"c1,{captures / 'first'},{captures / 'followup'},lesions.json,truth.json,anna\n"
+    )
+    return tmp_path
+
+
+def test_own_captures_are_measured_by_the_command(study, capsys):
+    arguments = ["evaluate", "captures", str(study / "manifest.csv"), "--methods", "nearest-bone"]
+    assert main([*arguments, "--frames", "1", "--out", str(study / "out")]) == 0
+    document = json.loads((study / "out" / "ladder.json").read_text())
+    row = next(r for r in document["rows"] if r["method"] == "nearest-bone")
+    assert row["group"] == "other stance"
+    assert row["answered"] == 1
+    assert 0 < row["mean_mm"] < 60
+    # A clicked pixel stands for the sensor's own place: there is no floor below it.
+    assert row["mean_mm"] == pytest.approx(row["beside_floor_mm"])
+
+
+def test_a_truth_off_the_skin_is_named(study, capsys):
+    truth = json.loads((study / "truth.json").read_text())
+    truth["lesions"][0] = {"id": truth["lesions"][0]["id"], "pixel": [3, 3]}
+    (study / "truth.json").write_text(json.dumps(truth))
+    arguments = ["evaluate", "captures", str(study / "manifest.csv"), "--methods", "nearest-bone"]
+    assert main([*arguments, "--frames", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "truth.json" in told
+    assert truth["lesions"][0]["id"] in told
 
 
 def test_yardsticks_are_no_methods_of_the_application(records):
