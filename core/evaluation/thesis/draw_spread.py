@@ -20,7 +20,7 @@ _BIN_MM = 5.0
 def draw_histograms(
     spreads: Mapping[str, Sequence[JointSpread]], stance: str, captures: int, delta_m: float, path: Path
 ) -> Path:
-    """Figure 9: fifteen histograms of e = d_i - mean d_i on one sheet, graded by fast marching.
+    """Figure 9: fifteen histograms of e = d_i - mean d_i on one sheet, graded by the votes of fast marching.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def draw_histograms(
                     lw=1.2,
                     label=label,
                 )
-            place.axvspan(-500 * delta_m, 500 * delta_m, color="0.9", zorder=0, lw=0)
+            place.axvspan(-1000 * delta_m, 1000 * delta_m, color="0.9", zorder=0, lw=0)
             place.set_title(
                 f"{fmm.joint.replace('_', ' ')}: {fmm.grade}", color=GRADE_COLOR[fmm.grade], weight="bold"
             )
@@ -59,7 +59,7 @@ def draw_histograms(
         grid[0, 0].set_ylim(top=1.25 * grid[0, 0].get_ylim()[1])
         grid[0, 0].legend(loc="upper left", fontsize=7)
         figure.supxlabel(
-            f"e = d - mean d (mm); grey: |e| below {500 * delta_m:.0f} mm, the limit of a good joint",
+            f"e = d - mean d (mm); grey: |e| below {1000 * delta_m:.0f} mm, where the joint votes rightly",
             fontsize=9,
         )
         figure.supylabel("share of captures and lesions (%)", fontsize=9)
@@ -79,15 +79,16 @@ def _reach_mm(spreads: Mapping[str, Sequence[JointSpread]]) -> float:
 def _figures(fmm: JointSpread, dm: JointSpread) -> str:
     if len(fmm.errors_m) == 0:
         return "not seen"
-    lines = [f"95 % of |e|:\nFMM {1000 * fmm.p95_m:.0f} mm\nDM {1000 * dm.p95_m:.0f} mm"]
+    lines = ["right votes", f"FMM {fmm.right:.0%}", f"DM {dm.right:.0%}"]
     if fmm.seen < 0.995:
-        lines.append(f"seen {100 * fmm.seen:.0f} %")
+        lines.append(f"(seen {fmm.seen:.0%})")
     return "\n".join(lines)
 
 
 def draw_variances(matrices: Mapping[str, FloatArray], stance: str, captures: int, path: Path) -> Path:
     """Figure 10: variance of every joint-joint geodesic distance, Dijkstra and fast marching side by side."""
     from matplotlib.colors import LogNorm
+    from matplotlib.ticker import FormatStrFormatter
 
     names = [name.replace("_", " ") for name in JOINT_NAMES]
     in_cm2 = {label: 1e4 * m for label, m in matrices.items()}
@@ -118,7 +119,9 @@ def draw_variances(matrices: Mapping[str, FloatArray], stance: str, captures: in
             place.set_title(f"{label}: mean {mean:.1f} cm², median {middle:.1f} cm²")
             place.spines[:].set_visible(False)
         if shown is not None:
-            figure.colorbar(shown, ax=list(panels), label="variance (cm²), logarithmic", shrink=0.85)
+            figure.colorbar(
+                shown, ax=list(panels), label="variance (cm²), logarithmic", shrink=0.85, format="%g"
+            ).ax.yaxis.set_minor_formatter(FormatStrFormatter("%g"))
         figure.suptitle(
             f"Variance of the geodesic distance between joints over {captures} captures, stance {stance}"
         )

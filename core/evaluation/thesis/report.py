@@ -10,7 +10,7 @@ from typing import Any
 from core.errors import WorkError
 from core.evaluation.thesis.experiments import ThesisResults
 from core.evaluation.thesis.records import without_nan
-from core.evaluation.thesis.statistics import LEAST_SEEN
+from core.evaluation.thesis.statistics import GOOD
 from core.relocation import write_json
 
 SIMULATED = (
@@ -124,16 +124,21 @@ def _grades(n: Mapping[str, Any]) -> str:
         return ""
     delta = 1000 * n["protocol"]["options"]["delta_m"]
     rule = (
-        f"Rule: *good* when 95 % of |e| lie below {delta / 2:.0f} mm (two captures then agree to within "
-        f"the {delta:.0f} mm of a voting band), *reasonable* below {delta:.0f} mm, *bad* otherwise or when "
-        f"the distance was measured in fewer than {LEAST_SEEN:.0%} of the cases. 95 % of |e|, in mm:"
+        f"A joint votes rightly when |e| < {delta:.0f} mm, the half width of a voting band. *Good*: right in "
+        f"at least {GOOD:.0%} of captures and lesions; *reasonable*: at least twice as often right as wrong; "
+        "*bad*: less. Share of right votes, and 95 % of |e| in mm:"
     )
     stances = list(n["figure_9"])
     head = ("joint", *(f"{stance}, {label}" for stance in stances for label in ("FMM", "DM")))
     rows = []
     for joint in n["figure_9"][stances[0]]["FMM"]:
         cells = [n["figure_9"][stance][label][joint] for stance in stances for label in ("FMM", "DM")]
-        rows.append((joint.replace("_", " "), *(f"{c['grade']} ({_mm(c['p95_m'], 0)})" for c in cells)))
+        rows.append(
+            (
+                joint.replace("_", " "),
+                *(f"{c['grade']} ({c['right']:.0%}, {_mm(c['p95_m'], 0)})" for c in cells),
+            )
+        )
     return f"{rule}\n\n{markdown_table(head, rows)}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 
 Grade = Literal["good", "reasonable", "bad"]
 
-LEAST_SEEN: Final = 0.8
-"""Share of the captures in which a joint's distance must be measured for it to be better than bad."""
+GOOD, REASONABLE = 0.95, 2 / 3
+"""Share of right votes from which a joint is good, and from which it is reasonable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,28 +34,31 @@ class JointSpread:
         Share of the captures and lesions for which the distance was measured.
     p95_m : float
         95th percentile of |e|; NaN without any.
+    right : float
+        Share of the captures and lesions for which |e| was measured and lies within the voting band.
     grade : {"good", "reasonable", "bad"}
-        See `grade_joint`.
+        By `right`; see `grade_joint`.
     """
 
     joint: str
     errors_m: FloatArray
     seen: float
     p95_m: float
+    right: float
     grade: Grade
 
 
-def grade_joint(p95_m: float, seen: float, delta_m: float) -> Grade:
-    """How far a joint can be trusted to vote, by the width of the votes' own band.
+def grade_joint(right: float) -> Grade:
+    """How far a joint can be trusted to vote, by the share of right votes it would cast.
 
-    A joint votes for the right place when its distance to it differs between two captures by less than
-    ``delta_m`` (eq. 1). *Good*: 95 % of |e| lie below half of it, so that two captures agree to within the
-    band. *Reasonable*: 95 % lie below the whole of it: the vote is right against the mean, but two captures
-    may disagree. *Bad*: worse, or measured in fewer than `LEAST_SEEN` of the captures.
+    A joint votes for the right place when its distance to it lies within ``delta_m`` of the stored one (eq.
+    1), here of the mean over the captures: when |e| < delta. *Good*: right at least 19 times in 20.
+    *Reasonable*: right at least twice as often as wrong. *Bad*: worse. A distance that could not be measured
+    is a wrong vote.
     """
-    if not np.isfinite(p95_m) or seen < LEAST_SEEN or p95_m >= delta_m:
-        return "bad"
-    return "good" if p95_m < delta_m / 2 else "reasonable"
+    if right >= GOOD:
+        return "good"
+    return "reasonable" if right >= REASONABLE else "bad"
 
 
 def joint_spreads(records: Sequence[CaptureRecord], label: str, delta_m: float) -> list[JointSpread]:
@@ -82,9 +85,10 @@ def joint_spreads(records: Sequence[CaptureRecord], label: str, delta_m: float) 
     for row, joint in enumerate(JOINT_NAMES):
         e = errors[:, :, row]
         e = e[np.isfinite(e)]
-        seen = len(e) / max(1, int(clicked.sum()))
+        places = max(1, int(clicked.sum()))
         p95 = float(np.percentile(np.abs(e), 95)) if len(e) else float("nan")
-        out.append(JointSpread(joint, e, seen, p95, grade_joint(p95, seen, delta_m)))
+        right = float((np.abs(e) < delta_m).sum() / places)
+        out.append(JointSpread(joint, e, len(e) / places, p95, right, grade_joint(right)))
     return out
 
 

@@ -138,6 +138,6 @@ def test_figures_that_need_clicks_are_left_out_or_refused(tmp_path, put_capture)
 
 
 def test_cpu_time_needs_no_captures(tmp_path):
-    results = run_thesis((), default_tracker(), None, tmp_path, figures=("cpu",))
+    results = run_thesis((), default_tracker(), None, tmp_path, figures=("cpu",), cpu_rounds=1)
     assert results.numbers["cpu"]["points"] == 60_000
     assert all(math.isfinite(m["one_source_s"]) for m in results.numbers["cpu"]["methods"])

@@ -49,19 +49,38 @@ def test_each_lesion_is_compared_with_its_own_mean():
     assert (head.joint, head.seen, head.grade) == ("head", 1.0, "good")
 
 
-def test_the_grade_follows_the_band_of_the_votes():
-    assert grade_joint(0.0149, 1.0, 0.03) == "good"
-    assert grade_joint(0.0151, 1.0, 0.03) == "reasonable"
-    assert grade_joint(0.0301, 1.0, 0.03) == "bad"
-    assert grade_joint(0.0149, 1.0, 0.02) == "reasonable"
-
-
-def test_a_joint_that_is_rarely_or_never_measured_is_bad():
-    assert grade_joint(0.001, 0.7, 0.03) == "bad"
+@pytest.mark.parametrize(
+    ("delta_m", "right", "grade"),
+    [(0.03, 1.0, "good"), (0.015, 0.75, "reasonable"), (0.005, 0.5, "bad")],
+)
+def test_the_grade_is_the_share_of_votes_that_the_band_lets_be_right(delta_m, right, grade):
     place = {"L1": [0.0, 0.0, 1.0]}
-    records = [record(str(k), lesions=place, to_lesion={"L1": distances(0.5)}) for k in range(3)]
-    neck = joint_spreads(records, "FMM", 0.03)[NECK]
-    assert (neck.grade, neck.seen, len(neck.errors_m)) == ("bad", 0.0, 0)
+    offsets = (0.0, 0.0, 0.01, -0.01, 0.001, -0.001, 0.02, -0.02)
+    records = [
+        record(str(k), lesions=place, to_lesion={"L1": distances(0.5 + e)}) for k, e in enumerate(offsets)
+    ]
+    head = joint_spreads(records, "FMM", delta_m)[HEAD]
+    assert (head.right, head.grade) == (right, grade)
+
+
+def test_the_limits_of_the_grades():
+    assert [grade_joint(x) for x in (0.95, 0.949, 0.667, 0.666)] == [
+        "good",
+        "reasonable",
+        "reasonable",
+        "bad",
+    ]
+
+
+def test_a_distance_that_was_not_measured_is_a_wrong_vote():
+    place = {"L1": [0.0, 0.0, 1.0]}
+    records = [
+        record(str(k), lesions=place, to_lesion={"L1": distances(0.5 if k < 6 else math.nan)})
+        for k in range(10)
+    ]
+    spreads = joint_spreads(records, "FMM", 0.03)
+    assert (spreads[HEAD].right, spreads[HEAD].seen, spreads[HEAD].grade) == (0.6, 0.6, "bad")
+    assert (spreads[NECK].right, spreads[NECK].grade, len(spreads[NECK].errors_m)) == (0.0, "bad", 0)
 
 
 def test_without_clicks_there_are_no_histograms():
