@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from datetime import date
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt, Signal, Slot
 from PySide6.QtWidgets import (
@@ -21,26 +20,21 @@ from PySide6.QtWidgets import (
 )
 
 from app.context import AppContext
-from app.tasks import Task
-from app.theme import ICON_SIZE, icon, palette, set_state, style_class
-from app.widgets.body_view import BodyLesion, BodyView, surface_colors
-from app.widgets.markers import Marker
-from app.widgets.photo_view import PhotoView
+from app.theme import ICON_SIZE, icon, palette, style_class
 from app.widgets.status import EmptyState, MessageBanner, ProgressOverlay
 from app.widgets.tables import Column, LesionRow, LesionTable, Row, RowTable
 from app.windows.compare_sheet import CompareSheet
+from app.windows.patient_body import PatientBody
 from app.windows.patient_model import LesionSummary, PatientModel
 from app.windows.patient_sheet import PatientSheet
-from app.windows.visit.pictures import stored_picture
 from app.workflows.wording import when
 from core.errors import GeodermError
 from core.progress import Progress
 
 if TYPE_CHECKING:
-    from core.records import CaptureRecord, Visit
+    from core.records import Visit
 
 _SEX = {"F": "female", "M": "male", "O": "other", "U": ""}
-PANES = (("photo", "Photo"), ("body", "3D body"))
 
 
 class PatientPage(QWidget):
@@ -63,9 +57,6 @@ class PatientPage(QWidget):
         style_class(self, "page")
         self._context = context
         self._model: PatientModel | None = None
-        self._capture_id: int | None = None
-        self._body_of: int | None = None
-        self._body_task: Task | None = None
         self._selected: str | None = None
         self.title = QLabel()
         self.title.setObjectName("patient_title")
@@ -81,14 +72,10 @@ class PatientPage(QWidget):
         self.lesions = LesionTable()
         self.lesions.selected_changed.connect(self.select)
         self.lesions.activated_key.connect(self._compare)
-        self.photo = PhotoView()
-        self.photo.setObjectName("patient_photo")
-        self.photo.marker_clicked.connect(self.select)
-        self.photo.marker_activated.connect(self._compare)
-        self.body = BodyView()
-        self.body.setObjectName("patient_body")
-        self.body.lesion_clicked.connect(self.select)
-        self.body.lesion_activated.connect(self._compare)
+        self.body_card = PatientBody(context)
+        self.body_card.lesion_clicked.connect(self.select)
+        self.body_card.lesion_activated.connect(self._compare)
+        self.body_card.failed.connect(self.banner.show_failure)
         self._build()
         self.overlay = ProgressOverlay(self)
         context.privacy_changed.connect(lambda _: self._show_header())
@@ -109,7 +96,7 @@ class PatientPage(QWidget):
         row = QHBoxLayout()
         row.setSpacing(16)
         row.addLayout(left, 5)
-        row.addWidget(self._picture_card(), 4)
+        row.addWidget(self._card("Body", self.body_card, [self.body_card.switch]), 4)
         column.addLayout(row, 1)
 
     def _header(self) -> QHBoxLayout:
@@ -192,43 +179,6 @@ class PatientPage(QWidget):
         self.lesion_stack.addWidget(self.no_lesions)
         return self.lesion_stack
 
-    def _picture_card(self) -> QFrame:
-        self._pane_buttons = {}
-        for key, text in PANES:
-            button = QPushButton(text)
-            button.setObjectName(f"patient_pane_{key}")
-            button.setCheckable(True)
-            style_class(button, "segment")
-            set_state(button, "first", "true" if key == PANES[0][0] else "false")
-            set_state(button, "last", "true" if key == PANES[-1][0] else "false")
-            button.clicked.connect(partial(self.show_pane, key))
-            self._pane_buttons[key] = button
-        switch = QWidget()
-        row = QHBoxLayout(switch)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        for button in self._pane_buttons.values():
-            row.addWidget(button)
-        photo = QFrame()
-        style_class(photo, "photo")
-        inside = QVBoxLayout(photo)
-        inside.setContentsMargins(1, 1, 1, 1)
-        inside.addWidget(self.photo)
-        self.no_picture = EmptyState("body", "No body capture yet", "It is taken in the first visit.")
-        self.panes = QStackedWidget()
-        for pane in (photo, self.body, self.no_picture):
-            self.panes.addWidget(pane)
-        self.caption = QLabel()
-        self.caption.setObjectName("patient_picture_caption")
-        style_class(self.caption, "caption")
-        content = QWidget()
-        column = QVBoxLayout(content)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(8)
-        column.addWidget(self.panes, 1)
-        column.addWidget(self.caption)
-        return self._card("Body", content, [switch])
-
     # -- what is shown -----------------------------------------------------------------------------
 
     @property
@@ -239,13 +189,14 @@ class PatientPage(QWidget):
     def show_patient(self, patient_id: int) -> None:
         """Show a patient."""
         if patient_id != self.patient_id:
-            self._selected = self._capture_id = None
+            self._selected = None
+            self.body_card.forget()
             self.banner.clear()
         self._model = PatientModel.load(self._context.store, patient_id)
         self._show_header()
         self._show_visits()
         self._show_lesions()
-        self._show_picture()
+        self.body_card.show_model(self._model, self._selected)
         self._show_buttons()
 
     @Slot(int)
@@ -303,84 +254,6 @@ class PatientPage(QWidget):
         self.lesion_stack.setCurrentWidget(self.lesions if self._model.lesions else self.no_lesions)
         self.lesions.set_selected(self._selected)
 
-    def _show_picture(self) -> None:
-        assert self._model is not None
-        record = self._record()
-        if record is None:
-            self._capture_id = None
-            self.panes.setCurrentWidget(self.no_picture)
-            self.caption.clear()
-            for button in self._pane_buttons.values():
-                button.setEnabled(False)
-            return
-        for button in self._pane_buttons.values():
-            button.setEnabled(True)
-        placed = self._model.on_capture(self._context.store, record.id)
-        if record.id != self._capture_id:
-            self._capture_id = record.id
-            self.photo.set_image(stored_picture(self._context.store, record))
-            self.photo.fit()
-        self.photo.set_markers(
-            [
-                Marker(
-                    str(s.lesion.id), str(s.lesion.number), *o.pixel, s.tone, movable=False, tooltip=s.status
-                )
-                for s, o in placed
-                if o.pixel is not None
-            ]
-        )
-        self.body.set_lesions(
-            [
-                BodyLesion(str(s.lesion.id), str(s.lesion.number), o.point_m, s.tone)
-                for s, o in placed
-                if o.point_m is not None
-            ]
-        )
-        self.photo.set_selected(self._selected)
-        self.body.set_selected(self._selected)
-        self.caption.setText(f"{record.view.capitalize()} view, {when(record.taken_at)}")
-        current = "body" if self.panes.currentWidget() is self.body else "photo"
-        self.show_pane(current)
-
-    def _record(self) -> CaptureRecord | None:
-        assert self._model is not None
-        views = self._model.views
-        return next((r for r in views if r.view == "front"), views[0] if views else None)
-
-    def show_pane(self, key: str, *_: object) -> None:
-        """Show the photo or the 3D body."""
-        for name, button in self._pane_buttons.items():
-            button.setChecked(name == key)
-        self.panes.setCurrentWidget(self.body if key == "body" else self.panes.widget(0))
-        if key == "body" and self._capture_id is not None and self._body_of != self._capture_id:
-            self._load_body(self._capture_id)
-
-    def _load_body(self, capture_id: int) -> None:
-        self._body_of = capture_id
-        self.body.clear()
-        store = self._context.store
-
-        def work(progress: Progress) -> Any:
-            from core.surface import scan_body
-
-            capture = store.captures.load(capture_id)
-            scan = scan_body(capture, progress=progress)
-            return (
-                scan.surface.vertices,
-                scan.surface.triangles,
-                surface_colors(capture, scan.surface.vertices),
-            )
-
-        def done(surface: Any) -> None:
-            if self._body_of == capture_id:
-                self.body.set_surface(*surface)
-                self._show_picture()
-
-        task = self._context.tasks.start("Building the 3D body", work)
-        task.finished.connect(done)
-        task.failed.connect(self.banner.show_failure)
-        self._body_task = task
-
     def _show_buttons(self) -> None:
         visit = self._selected_visit()
         self.open_visit.setEnabled(visit is not None)
@@ -404,8 +277,7 @@ class PatientPage(QWidget):
         """Select a lesion in every view."""
         self._selected = lesion_id
         self.lesions.set_selected(lesion_id)
-        self.photo.set_selected(lesion_id)
-        self.body.set_selected(lesion_id)
+        self.body_card.set_selected(lesion_id)
         self._show_buttons()
 
     # -- what is done ------------------------------------------------------------------------------

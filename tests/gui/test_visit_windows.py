@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -193,8 +194,7 @@ def test_a_follow_up_by_mouse(open_page: Open, world: World) -> None:
     ids = [int(i) for i in screen.list.ids()]
     assert len(ids) == 3
     status = screen.list.item(0, 2).text()
-    assert status.startswith("Proposed, ±")
-    assert status.endswith("mm: check")
+    assert re.fullmatch(r"Proposed, ±\d+( x \d+)? mm(: check)?", status), status
     assert hands.page.lesions.selected_id == ids[0], "the first one that waits is at hand"
 
     hands.click("pane_compare")

@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Slot
 
 from app.widgets.markers import Marker
 from app.windows.visit.dermoscopy_strip import Thumbnail
+from app.windows.visit.earlier_photo import EarlierPhoto
 from app.windows.visit.host import VisitHost
 from app.windows.visit.lesion_screen import LesionScreen
 from app.windows.visit.pictures import capture_picture, stored_picture
@@ -17,7 +18,6 @@ from app.windows.visit.shown import (
     CANDIDATE,
     body_lesions,
     candidate_markers,
-    earlier_markers,
     lesion_line,
     photo_markers,
 )
@@ -42,12 +42,11 @@ class LesionStep(QObject):
         self._placing: int | None = None
         self._marking = False
         self._picture_key: tuple[int, bool] | None = None
-        self._previous_id: int | None = None
         self._entered = False
         s = self.screen
         s.selected.connect(self._on_marker)
         s.refine.connect(self._refine)
-        s.show_earlier_capture.connect(self._show_earlier)
+        s.show_earlier_capture.connect(lambda i: self._earlier.show_capture(i, self._selected))
         s.placed.connect(self._on_placed)
         s.moved.connect(self._on_moved)
         s.delete_requested.connect(lambda i: self._delete(int(i)))
@@ -56,9 +55,10 @@ class LesionStep(QObject):
         s.accept_unseen.connect(self._accept_unseen)
         s.mark_new.connect(self._set_marking)
         s.primary_clicked.connect(lambda: self._attempt(lambda: self._session.fire(Event.GO_REVIEW)))
-        s.pane_changed.connect(lambda _: self._show_previous())
+        s.pane_changed.connect(lambda _: self._earlier.show(self._selected))
         d = s.details
         self._spots = SpotsCorner(host, s, self._show_capture, self._mark)
+        self._earlier = EarlierPhoto(host, s, self._spots)
         d.confirm.connect(lambda: self._decide(self._session.confirm))
         d.not_in_view.connect(lambda: self._decide(self._session.not_in_view))
         d.undo.connect(lambda: self._on_selected(self._session.reopen))
@@ -175,7 +175,7 @@ class LesionStep(QObject):
         self._show_placing()
         self._show_details()
         self._spots.refresh()
-        self._show_previous()
+        self._earlier.show(self._selected)
 
     def _markers(self, lesions: list[Lesion]) -> list[Marker]:
         """Lesions, the selected one's other places, and the spots while they are listed."""
@@ -229,35 +229,6 @@ class LesionStep(QObject):
             ]
         )
         self.screen.show_details(True)
-
-    def _show_previous(self) -> None:
-        """The photo of the previous visit on which the selected lesion was seen, else the newest one."""
-        if self.screen.pane != "compare":
-            return
-        session = self._session
-        snapshot = session.snapshot
-        places = {x.id: snapshot.previous(x.id) for x in snapshot.lesions}
-        chosen = places.get(self._selected) if self._selected is not None else None
-        chosen = chosen or next((o for o in reversed(list(places.values())) if o is not None), None)
-        if chosen is None:
-            self.screen.show_previous([], "There is no previous visit to compare with.")
-            return
-        self._show_earlier(chosen.capture_id)
-
-    @Slot(int)
-    def _show_earlier(self, capture_id: int) -> None:
-        """Show a capture of an earlier visit beside."""
-        session, snapshot = self._session, self._session.snapshot
-        record = snapshot.captures[capture_id]
-        if self._previous_id != record.id:
-            self._previous_id = record.id
-            self.screen.previous.set_image(stored_picture(session.store, record))
-        visit = next(v for v in (*snapshot.earlier, snapshot.visit) if v.id == record.visit_id)
-        self.screen.show_previous(
-            [*earlier_markers(session, record.id), *self._spots.markers(record.id)],
-            f"Visit {visit.number}, {record.view} view, {when(record.taken_at)}",
-        )
-        self.screen.previous.set_selected(None if self._selected is None else str(self._selected))
 
     # --- acts ----------------------------------------------------------------------------------------
 
