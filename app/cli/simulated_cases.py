@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 CLICK_ERROR_PX = 1.5
-"""Standard deviation of a click on the 2560 x 1920 picture."""
+"""Standard deviation of a click on the 2560 x 1920 picture; on a smaller picture less in proportion."""
+
+COLOR_SIZE = (2560, 1920)
 
 SAME_SKIN_M = 0.004
 """A picture shows a place if the skin it shows at that pixel is this close to it."""
@@ -50,16 +52,23 @@ class SimulatedCases:
     cache : Path, optional
         Folder in which captures are kept. A pair in it that was made by another simulator or with other
         settings is made again.
+    color_size : (width, height)
+        Of the auxiliary camera.
     """
 
     def __init__(
-        self, pairs: Sequence[SimulatedPair], *, frames: int = FRAMES, cache: Path | None = None
+        self,
+        pairs: Sequence[SimulatedPair],
+        *,
+        frames: int = FRAMES,
+        cache: Path | None = None,
+        color_size: tuple[int, int] = COLOR_SIZE,
     ) -> None:
         if not pairs:
             raise InputError("An evaluation needs at least one pair.")
         if cache is not None:
             _make_folder(cache)
-        self._pairs, self._frames, self._cache = tuple(pairs), frames, cache
+        self._pairs, self._frames, self._cache, self._size = tuple(pairs), frames, cache, color_size
 
     def __len__(self) -> int:
         return len(self._pairs)
@@ -67,14 +76,16 @@ class SimulatedCases:
     def cases(self) -> Iterator[PendingCase]:
         """All pairs, one at a time."""
         for pair in self._pairs:
-            yield SimulatedCase(pair, self._frames, self._cache)
+            yield SimulatedCase(pair, self._frames, self._cache, self._size)
 
 
 class SimulatedCase:
     """One pair, rendered or read from the cache when first needed (`core.evaluation.PendingCase`)."""
 
-    def __init__(self, pair: SimulatedPair, frames: int, cache: Path | None) -> None:
-        self._pair, self._frames = pair, frames
+    def __init__(
+        self, pair: SimulatedPair, frames: int, cache: Path | None, color_size: tuple[int, int]
+    ) -> None:
+        self._pair, self._frames, self._size = pair, frames, color_size
         self._folder = None if cache is None else cache / f"{_slug(pair)}-{frames}f"
 
     @property
@@ -108,14 +119,21 @@ class SimulatedCase:
     @cached_property
     def _captures(self) -> tuple[SimulatedCapture, SimulatedCapture]:
         if self._folder is None:
-            return _render(self._pair, self._frames)
+            return _render(self._pair, self._frames, self._size)
         made_by = json.loads(
-            json.dumps({**asdict(self._pair), "frames": self._frames, "simulator": simulator_code()})
+            json.dumps(
+                {
+                    **asdict(self._pair),
+                    "frames": self._frames,
+                    "color_size": self._size,
+                    "simulator": simulator_code(),
+                }
+            )
         )
         if _read_done(self._folder) != made_by:
             if self._folder.exists():
                 shutil.rmtree(self._folder)
-            _write(_render(self._pair, self._frames), self._folder, made_by)
+            _write(_render(self._pair, self._frames, self._size), self._folder, made_by)
         return _read(self._folder / "first"), _read(self._folder / "followup")
 
     @cached_property
@@ -130,7 +148,7 @@ class SimulatedCase:
         rng = np.random.default_rng(self._pair.seed)
         out = []
         for i, name in enumerate(one.mole_ids):
-            click = one.mole_pixels[i] + rng.normal(0.0, CLICK_ERROR_PX, 2)
+            click = one.mole_pixels[i] + rng.normal(0.0, CLICK_ERROR_PX * self._size[0] / COLOR_SIZE[0], 2)
             gone = name not in two.mole_row
             healed = gone or name in two.healed_ids
             if not one.mole_visible[i] or not (healed or name.startswith("L")):
@@ -194,10 +212,13 @@ def some_frames(capture: RgbdCapture, count: int) -> RgbdCapture:
     return replace(capture, depth_frames=capture.depth_frames[start : start + count])
 
 
-def _render(pair: SimulatedPair, frames: int) -> tuple[SimulatedCapture, SimulatedCapture]:
+def _render(
+    pair: SimulatedPair, frames: int, color_size: tuple[int, int]
+) -> tuple[SimulatedCapture, SimulatedCapture]:
+    from devices.simulator import make_rig
     from devices.simulator.cases import make_pair
 
-    _, first, followup = make_pair(pair, frames)
+    _, first, followup = make_pair(pair, frames, make_rig(color_size))
     return first, followup
 
 

@@ -45,7 +45,7 @@ def source(folder):
         new_moles=8,
         vanished=8,
     )
-    return SimulatedCases([pair], frames=3, cache=folder / "captures")
+    return SimulatedCases([pair], frames=3, cache=folder / "captures", color_size=(1280, 960))
 
 
 @pytest.fixture(scope="module")
@@ -96,9 +96,15 @@ def test_what_was_measured_is_not_measured_again(source, folder, records, monkey
     assert {r.rung.method: r for r in again} == records
 
 
-def test_captures_are_rendered_once(source, records, monkeypatch):
-    monkeypatch.setattr("app.cli.simulated_cases._render", None)
-    case = next(iter(source.cases())).load("true", 1)
+@pytest.fixture(scope="module")
+def case(source, records):
+    """The same pair with one frame of each capture, which must be in the cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("app.cli.simulated_cases._render", None)
+        return next(iter(source.cases())).load("true", 1)
+
+
+def test_captures_are_rendered_once_and_a_frame_is_taken_of_them(case):
     assert len(case.first.capture.depth_frames) == 1
     assert len(case.spots.new_m) + len(case.spots.vanished_m) > 0
 
@@ -114,9 +120,8 @@ def test_the_report_has_pictures_for_people_and_json_for_programs(records, folde
 
 
 @pytest.fixture
-def study(folder, source, records, tmp_path):
+def study(folder, case, tmp_path):
     """A manifest of the same captures, with the true pixels as somebody would have clicked them."""
-    case = next(iter(source.cases())).load("true", 1)
     captures = next((folder / "captures").iterdir())
     seen = [lesion for lesion in case.lesions if not lesion.healed][:8]
     write = {
