@@ -122,3 +122,9 @@ def test_on_worker_processes_a_killed_worker_costs_nothing_but_time(cohort: Path
     through = tmp_path / "through"
     geoderm("relocate-batch", manifest, "--out", through, "--workers", 0)
     assert results_of(out) == results_of(through)
+
+
+def test_the_command_line_does_not_load_dask() -> None:
+    code = "import sys, app.cli.main as m; m.build_app(); print({'dask', 'distributed'} & set(sys.modules))"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert printed.stdout.strip() == "set()"
