@@ -69,8 +69,9 @@ class BodyPicture:
     def mask(self, cells: BoolImage) -> BoolImage:
         """A map of cells in crop pixels (h, w)."""
         h, w = self.darkness.shape
-        large = np.repeat(np.repeat(cells.view(np.uint8), self.cell, axis=0), self.cell, axis=1)
-        return np.asarray(large[:h, :w].view(np.bool_))
+        size = (cells.shape[1] * self.cell, cells.shape[0] * self.cell)
+        large = cv2.resize(cells.view(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        return np.ascontiguousarray(large[:h, :w]).view(np.bool_)
 
 
 def cut_body_picture(scan: BodyScan) -> BodyPicture | None:

@@ -74,11 +74,11 @@ def find_blobs(picture: BodyPicture) -> Blobs:
     largest = _LARGEST_M * picture.pixels_per_m
     while sigma * size * _RADIUS_PER_SIGMA < largest and min(image.shape) > 16:
         wider = cv2.GaussianBlur(image, (0, 0), sigma * np.sqrt(_STEP**2 - 1.0))
-        found.append(_maxima(image - wider, sigma, size, search, quiet))
+        found.append(_maxima(cv2.subtract(image, wider), sigma, size, search, quiet))
         image, sigma = wider, sigma * _STEP
         if sigma > 2.2:
-            image, sigma, size = image[::2, ::2], sigma / 2.0, size * 2
-            search, quiet = search[::2, ::2], quiet[::2, ::2]
+            image, sigma, size = np.ascontiguousarray(image[::2, ::2]), sigma / 2.0, size * 2
+            search, quiet = (np.ascontiguousarray(m[::2, ::2]) for m in (search, quiet))
     return _without_doubles(found)
 
 
@@ -93,12 +93,14 @@ def _maxima(
     """Local maxima of one level; ``size`` crop pixels per pixel of the level."""
     sample = response[::3, ::3][quiet[::3, ::3]]
     noise = 1.4826 * float(np.median(np.abs(sample))) if len(sample) else 0.0
-    threshold = np.float32(max(_LEAST_RESPONSE, _GLOBAL_NOISES * noise))
-    candidate = (response > threshold) & search
-    candidate &= response >= cv2.dilate(response, np.ones((3, 3), np.uint8))
-    candidate[[0, -1]] = False
-    candidate[:, [0, -1]] = False
-    y, x = np.nonzero(candidate)
+    threshold = max(_LEAST_RESPONSE, _GLOBAL_NOISES * noise)
+    top = cv2.compare(response, cv2.dilate(response, np.ones((3, 3), np.uint8)), cv2.CMP_GE)
+    top &= cv2.compare(response, threshold, cv2.CMP_GT)
+    top &= search.view(np.uint8)
+    top[[0, -1]] = 0
+    top[:, [0, -1]] = 0
+    where = cv2.findNonZero(top)
+    x, y = (np.zeros((0, 2), np.int64) if where is None else where.reshape(-1, 2).astype(np.int64)).T
     local = _local_noise(response, quiet, noise)
     at = response[y, x]
     noises = (

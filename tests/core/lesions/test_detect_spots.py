@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core.lesions import SkinSpots, detect_spots
-from core.surface import BodyScan, scan_body
+from core.surface import BodyScan, pick_skin, scan_body
 from tests.core.lesions.conftest import BROWN, CENTER, DARK_SKIN, HALF, Disc, color_camera, meet, trunk
 
 SPOTS = (
@@ -70,6 +70,13 @@ def test_every_spot_lies_on_the_skin(scan, spots):
         "nk,nkx->nx", spots.barycentric, scan.surface.vertices[scan.surface.triangles[spots.triangles]]
     )
     assert np.linalg.norm(on_surface - spots.points_m, axis=1).max() < 0.013
+
+
+def test_a_spot_is_where_a_click_on_it_would_be(scan, spots):
+    for row in range(len(spots)):
+        pick = pick_skin(scan, spots.pixels[row])
+        if pick.point is not None:
+            assert spots.points_m[row] == pytest.approx(pick.point.position_m, abs=1e-6)
 
 
 @pytest.mark.parametrize("width", [640, 3840])
