@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 
 from core.errors import WorkError
-from core.relocation.bones import rigid_fit
 from core.relocation.registration.graph import DeformationGraph
 from core.relocation.registration.start import SkeletonStart
 from core.surface import BodySurface
@@ -22,6 +21,11 @@ DOUBT_M = 0.010
 """A sample this far from the follow-up's skin counts half."""
 SLIDE = 0.01
 """Weight of the distance along the skin against the one across it: skin may slide on the shape."""
+FACING = 0.2
+"""Cosine to the camera below which carried skin has no counterpart: it has turned out of the view, and the rim
+that it leaves would pull a limb back that has turned about its axis."""
+TURNING_M2 = 0.1 * 0.045**2
+"""Resistance of neighbouring nodes to turning against each other, beside that of their edge to stretching."""
 DAMPING = 1e-4
 SETTLED_M = 2e-4
 """A round that moves no node farther ends its stage."""
@@ -109,8 +113,10 @@ class EmbeddedDeformation:
         self.node_rest = start(self._node_first)[1]
         self.node_now = self.node_rest.copy()
         self.rotation = np.tile(np.eye(3), (len(self.node_rest), 1, 1))
+        self._node_turn = np.ascontiguousarray(start(self._node_first)[0])
+        self._skeleton_turn = np.tile(np.eye(3), (len(self.node_rest), 1, 1))
         self._prewarped = True
-        self._share = np.ones(len(graph.edges))
+        self._links = np.ascontiguousarray(graph.edges[graph.edges[:, 0] < graph.edges[:, 1]])
         self._bandwidth = self._band()
 
     def _band(self) -> int:
@@ -123,16 +129,8 @@ class EmbeddedDeformation:
 
     def return_to_rest(self) -> None:
         """Make the first skin itself the rest state, keeping the present fit."""
-        turned, moved = self._start(self._node_first)
-        now = self.node_now
-        neighbours: list[list[int]] = [[i] for i in range(len(now))]
-        for i, j in self.graph.edges:
-            neighbours[i].append(int(j))
-        rotation = np.einsum("kij,kjl->kil", self.rotation, turned)
-        for i, group in enumerate(neighbours):
-            if len(group) > 3:
-                rotation[i] = rigid_fit(self._node_first[group], now[group])[0]
-        self.rotation = np.ascontiguousarray(rotation)
+        self.rotation = np.ascontiguousarray(np.einsum("kij,kjl->kil", self.rotation, self._node_turn))
+        self._skeleton_turn = self._node_turn
         self.node_rest = self._node_first
         self._rest, self._rest_normals = self._first, self._first_normals
         self._prewarped = False
@@ -210,6 +208,7 @@ class EmbeddedDeformation:
         found = nearest >= 0
         index = np.maximum(nearest, 0)
         found &= (np.einsum("ki,ki->k", normals, target.normals[index]) > stage.cosine) & ~target.boundary[index]
+        found &= np.einsum("ki,ki->k", normals, here) < -FACING * np.linalg.norm(here, axis=1)
         gap = np.einsum("ki,ki->k", target.normals[index], here - target.vertices[index])
         weight = np.where(found, 1.0 / (1.0 + (gap / DOUBT_M) ** 2), 0.0)
         size = 6 * len(self.node_now)
@@ -234,7 +233,16 @@ class EmbeddedDeformation:
                 rest, carriers, weights, np.zeros_like(rest), marks.targets, nothing, strength, *state, band, right
             )
         add_stiffness(
-            self.graph.edges, self._share, stage.stiffness, stage.slip_m, *state, band, right
+            self._links,
+            stage.stiffness,
+            stage.slip_m,
+            TURNING_M2,
+            self.rotation,
+            self._skeleton_turn,
+            self.node_rest,
+            self.node_now,
+            band,
+            right,
         )
         band[0] += DAMPING
         try:

@@ -48,15 +48,18 @@ def register_skins(pair: VisitPair, *, seed: int = 0) -> DenseRegistration | Non
     joints = joint_landmarks(pair)
     deformation.solve(followup, FIRST_STAGES, joints)
     deformation.return_to_rest()
-    fit = deformation.solve(followup, SECOND_STAGES * 2, joints)
+    fit = deformation.solve(followup, SECOND_STAGES, joints)
     return DenseRegistration(deformation, start, joints, fit)
 
 
 def joint_landmarks(pair: VisitPair) -> Landmarks:
-    """The skin next to every joint that both visits saw."""
+    """The centres of the joints that both visits saw.
+
+    The centres and not the skin before them: the skin nearest to a joint faces the camera in both visits, and
+    would hold back every limb that turned about its axis.
+    """
     names = pair.joint_names
     if not names:
         return Landmarks(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
-    places = np.array([pair.first.anchors[name].position_m for name in names])
-    targets = np.array([pair.followup.anchors[name].position_m for name in names])
-    return Landmarks(places, targets, np.ones(len(names)))
+    both = [pair.joints_m(name) for name in names]
+    return Landmarks(np.array([b[0] for b in both]), np.array([b[1] for b in both]), np.ones(len(names)))

@@ -132,65 +132,98 @@ def add_places(
 
 
 @njit(cache=True, nogil=True)
+def _add_rows(
+    jacobian: FloatArray, residual: FloatArray, weight: float, i: int, j: int, band: FloatArray, right: FloatArray
+) -> None:
+    """Add ``weight |J (u_i, u_j) + residual|^2`` for three rows over the unknowns of two nodes, J (3, 12)."""
+    for k in range(12):
+        row = 6 * i + k if k < 6 else 6 * j + k - 6
+        x, y, z = jacobian[0, k], jacobian[1, k], jacobian[2, k]
+        right[row] -= weight * (x * residual[0] + y * residual[1] + z * residual[2])
+        for m in range(12):
+            column = 6 * i + m if m < 6 else 6 * j + m - 6
+            if column <= row:
+                band[row - column, column] += weight * (
+                    x * jacobian[0, m] + y * jacobian[1, m] + z * jacobian[2, m]
+                )
+
+
+@njit(cache=True, nogil=True)
+def _rotation_vector(one: FloatArray, two: FloatArray, out: FloatArray) -> None:
+    """Rotation vector of ``one two^T``, exact enough to a right angle."""
+    trace = 0.0
+    for c in range(3):
+        out[c] = 0.0
+    for k in range(3):
+        trace += one[0, k] * two[0, k] + one[1, k] * two[1, k] + one[2, k] * two[2, k]
+        out[0] += one[2, k] * two[1, k] - one[1, k] * two[2, k]
+        out[1] += one[0, k] * two[2, k] - one[2, k] * two[0, k]
+        out[2] += one[1, k] * two[0, k] - one[0, k] * two[1, k]
+    angle = np.arccos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
+    sine = np.sin(angle)
+    share = 0.5 * angle / sine if sine > 1e-4 else 0.5
+    for c in range(3):
+        out[c] *= share
+
+
+@njit(cache=True, nogil=True)
 def add_stiffness(
     edges: IntArray,
-    share: FloatArray,
     weight: float,
     slip_m: float,
+    turning: float,
     rotation: FloatArray,
+    start: FloatArray,
     node_rest: FloatArray,
     node_now: FloatArray,
     band: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Add ``weight sum_ij share_ij phi_ij |R_i (g_j - g_i) + x_i - x_j|^2``, as rigid as possible.
+    """Add ``weight sum_ij phi_ij |(R_i + R_j) / 2 (g_j - g_i) + x_i - x_j|^2`` and a resistance to turning.
 
-    ``phi = 1 / (1 + |residual|^2 / slip^2)^2`` lets an edge go that is stretched much: the robust form without
-    which raised arms snap back (METHOD section 3).
+    An edge over a bent elbow is half of the upper arm and half of the forearm: with the mean of both rotations
+    a bend costs nothing, where the one-sided form (Sumner 2007) must break the edge. ``phi = 1 / (1 +
+    |residual|^2 / slip^2)^2`` lets go of edges that are stretched nevertheless. What a node turns beyond the
+    skeleton's turn ``start`` should be what its neighbours turn: ``weight turning |log S_i S_j^T|^2`` with
+    ``S = R start^T`` keeps a limb from rolling about its axis, which no surface of its shape would resist.
     """
-    a = np.empty(3)
-    r = np.empty(3)
-    skew = np.zeros((3, 3))
+    jacobian = np.zeros((3, 12))
+    residual = np.empty(3)
+    a, b = np.empty(3), np.empty(3)
+    one, two = np.empty((3, 3)), np.empty((3, 3))
     for e in range(len(edges)):
         i, j = edges[e, 0], edges[e, 1]
         square = 0.0
         for k in range(3):
-            a[k] = 0.0
+            a[k] = b[k] = 0.0
             for m in range(3):
-                a[k] += rotation[i, k, m] * (node_rest[j, m] - node_rest[i, m])
-            r[k] = a[k] + node_now[i, k] - node_now[j, k]
-            square += r[k] * r[k]
-        w = weight * share[e] / (1.0 + square / (slip_m * slip_m)) ** 2
-        # residual changes by omega x a + t_i - t_j; skew maps omega to omega x a
-        skew[0, 1], skew[0, 2] = a[2], -a[1]
-        skew[1, 0], skew[1, 2] = -a[2], a[0]
-        skew[2, 0], skew[2, 1] = a[1], -a[0]
-        one, two = 6 * i, 6 * j
+                d = 0.5 * (node_rest[j, m] - node_rest[i, m])
+                a[k] += rotation[i, k, m] * d
+                b[k] += rotation[j, k, m] * d
+            residual[k] = a[k] + b[k] + node_now[i, k] - node_now[j, k]
+            square += residual[k] * residual[k]
+        jacobian[:, :] = 0.0
+        jacobian[0, 1], jacobian[0, 2] = a[2], -a[1]
+        jacobian[1, 0], jacobian[1, 2] = -a[2], a[0]
+        jacobian[2, 0], jacobian[2, 1] = a[1], -a[0]
+        jacobian[0, 7], jacobian[0, 8] = b[2], -b[1]
+        jacobian[1, 6], jacobian[1, 8] = -b[2], b[0]
+        jacobian[2, 6], jacobian[2, 7] = b[1], -b[0]
         for k in range(3):
-            s = skew[0, k] * r[0] + skew[1, k] * r[1] + skew[2, k] * r[2]
-            right[one + k] -= w * s
-            right[one + 3 + k] -= w * r[k]
-            right[two + 3 + k] += w * r[k]
-            band[0, one + 3 + k] += w
-            band[0, two + 3 + k] += w
-            for m in range(k + 1):
-                band[k - m, one + m] += w * (
-                    skew[0, k] * skew[0, m] + skew[1, k] * skew[1, m] + skew[2, k] * skew[2, m]
-                )
-            for m in range(3):
-                # rows t_i (3 + k), columns omega_i (m)
-                band[3 + k - m, one + m] += w * skew[k, m]
-                # rows or columns t_j against omega_i
-                p, q = two + 3 + k, one + m
-                if p > q:
-                    band[p - q, q] -= w * skew[k, m]
-                else:
-                    band[q - p, p] -= w * skew[k, m]
-            p, q = two + 3 + k, one + 3 + k
-            if p > q:
-                band[p - q, q] -= w
-            else:
-                band[q - p, p] -= w
+            jacobian[k, 3 + k], jacobian[k, 9 + k] = 1.0, -1.0
+        phi = 1.0 / (1.0 + square / (slip_m * slip_m)) ** 2
+        _add_rows(jacobian, residual, weight * phi, i, j, band, right)
+        for r in range(3):
+            for k in range(3):
+                one[r, k] = two[r, k] = 0.0
+                for m in range(3):
+                    one[r, k] += rotation[i, r, m] * start[i, k, m]
+                    two[r, k] += rotation[j, r, m] * start[j, k, m]
+        _rotation_vector(one, two, residual)
+        jacobian[:, :] = 0.0
+        for k in range(3):
+            jacobian[k, k], jacobian[k, 6 + k] = 1.0, -1.0
+        _add_rows(jacobian, residual, weight * turning, i, j, band, right)
 
 
 @njit(cache=True, nogil=True)
