@@ -122,8 +122,8 @@ def _error_against_time(rows: Sequence[LadderRow]) -> Figure | None:
         ax.set_title(group, loc="left", color=_INK, fontsize=11)
         ax.set_xlabel("time of one relocation, s", color=_INK)
         ax.set_ylabel("mean error, mm", color=_INK)
-        if some:
-            ax.legend(fontsize=8, frameon=False, loc="best")
+    handles = max((ax.get_legend_handles_labels() for ax in axes), key=lambda pair: len(pair[0]))
+    figure.legend(*handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     figure.suptitle(f"Error against time: {own[0].rung.conditions}", color=_INK, fontsize=12)
     return figure
 
@@ -170,9 +170,7 @@ def _cumulative(records: Sequence[Record], rungs: Sequence[Rung]) -> Figure | No
         ax.set_ylabel("visible lesions found within it, %", color=_INK)
     if not any_line:
         return None
-    handles = axes[0].get_legend_handles_labels()
-    if not handles[0]:
-        handles = axes[1].get_legend_handles_labels()
+    handles = max((ax.get_legend_handles_labels() for ax in axes), key=lambda pair: len(pair[0]))
     figure.legend(*handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     return figure
 
