@@ -120,7 +120,7 @@ def thesis(
     )
     numbers, page = write_results(results, out)
     typer.echo(page.read_text(encoding="utf-8"))
-    typer.echo(f"{len(results.pictures)} pictures, {numbers.name} and {page.name} are in {out}")
+    typer.echo(f"Written to {out}: {numbers.name}, {page.name}, pictures: {len(results.pictures)}")
 
 
 def _names(text: str) -> tuple[str, ...]:

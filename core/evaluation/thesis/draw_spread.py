@@ -51,7 +51,10 @@ def draw_histograms(
                 )
             place.axvspan(-1000 * delta_m, 1000 * delta_m, color="0.9", zorder=0, lw=0)
             place.set_title(
-                f"{fmm.joint.replace('_', ' ')}: {fmm.grade}", color=GRADE_COLOR[fmm.grade], weight="bold"
+                f"{fmm.joint.replace('_', ' ')}: {fmm.grade}",
+                color=GRADE_COLOR[fmm.grade],
+                weight="bold",
+                fontsize=8.5,
             )
             place.text(
                 0.98, 0.95, _figures(fmm, dm), transform=place.transAxes, ha="right", va="top", fontsize=7
