@@ -24,6 +24,7 @@ from core.relocation.types import (
     RelocationResult,
 )
 from core.relocation.view_choice import best_of_views, is_settled
+from core.relocation.view_crossing import Crossing
 from core.relocation.view_spots import PairSpots, SpotsOfVisits
 from core.relocation.views import is_rigid, opposite, turn_deg
 from core.relocation.visibility import turned_away
@@ -161,8 +162,10 @@ class _Search:
             self.seconds[name] = self.seconds.get(name, 0.0) + value
         self.warnings += [self._told(a, b, warning) for warning in result.warnings]
         self.spots.append(PairSpots(a, b, result.new_spots, result.vanished_spots))
+        crossing = Crossing(self.first[a], self.followup[b])
+        queries = {q.id: q for q in self.queries}
         for lesion in result.lesions:
-            answer = replace(lesion, capture=b)
+            answer = crossing.judged(queries[lesion.id], replace(lesion, capture=b))
             self.answers.setdefault(lesion.id, []).append(answer)
             if is_settled(answer, self.followup[b], appearance=appearance):
                 self.settled.add(lesion.id)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from core.relocation import LesionQuery, RelocatedLesion, Spot, relocate_visit
 from core.relocation.pair import VisitPair
 from core.relocation.types import Region
 from core.relocation.view_choice import best_of_views, is_settled
+from core.relocation.view_crossing import Crossing
 from core.relocation.view_spots import PairSpots, SpotsOfVisits
 from core.relocation.views import BoneBridge, frontality, is_rigid, opposite, turn_deg
 from devices.simulator import STILL, CaptureTruth, SimulatedPatient
@@ -69,8 +72,6 @@ def test_the_skeleton_carries_places_between_views_to_a_few_centimetres(views: V
 
 
 def test_guessed_joints_carry_nothing(views: Views) -> None:
-    from dataclasses import replace
-
     front, left = views["front"][0], views["left"][0]
     assert is_rigid(VisitPair(front, left))
     assert turn_deg(VisitPair(front, left)) == pytest.approx(90, abs=3)
@@ -198,3 +199,54 @@ def test_opposite_sides_are_not_searched(views: Views, captures: dict[str, Analy
     assert answer.point_m is not None
     assert answer.capture in ("front", "left")
     assert result.seconds["total"] > 0
+
+
+def test_an_answer_in_another_view_counts_only_where_the_skeleton_carries_it(views: Views) -> None:
+    front, left = views["front"][0], views["left"][0]
+    query, here, there = _query_in_both(views)
+    crossing = Crossing(front, left)
+    assert crossing.is_crossing
+    right = _answer("predicted", there, 0.02, "left")
+    assert crossing.judged(query, right) is right
+    elsewhere = left.scan.surface.nearest(there + np.array([0.0, 0.5, 0.0]))[0].position_m
+    wrong = crossing.judged(query, _answer("predicted", np.asarray(elsewhere), 0.02, "left"))
+    assert (wrong.status, wrong.point_m) == ("refused", None)
+    doubted = crossing.judged(query, _answer("found", np.asarray(elsewhere), 0.01, "left"))
+    assert doubted.status == "ambiguous"
+    assert doubted.confidence < 0.8
+    own = Crossing(front, front)
+    assert not own.is_crossing
+    strange = _answer("predicted", np.asarray(here + 0.3), 0.02, "front")
+    assert own.judged(query, strange) is strange
+
+
+def test_where_the_joints_do_not_fit_geometry_alone_answers_nothing_in_another_view(views: Views) -> None:
+    front, left = views["front"][0], views["left"][0]
+    query, _, there = _query_in_both(views)
+    joints = dict(left.skeleton.joints)
+    moved = joints["left_shoulder"].point_m + np.array([0.2, 0.0, 0.1])
+    joints["left_shoulder"] = replace(joints["left_shoulder"], point_m=moved)
+    crossing = Crossing(front, replace(left, skeleton=replace(left.skeleton, joints=joints)))
+    assert crossing.is_crossing, "the sides' names tell"
+    assert crossing.judged(query, _answer("predicted", there, 0.02, "left")).status == "refused"
+    seen = _answer("found", there, 0.005, "left")
+    assert crossing.judged(query, seen) is seen, "what was seen again needs no joints"
+
+
+def _query_in_both(views: Views) -> tuple[LesionQuery, np.ndarray, np.ndarray]:
+    """A lesion that front and left see, where the skeleton says so, too."""
+    one, two = views["front"][1], views["left"][1]
+    bridge = BoneBridge(views["front"][0], views["left"][0])
+    for i, name in enumerate(one.mole_ids):
+        if (
+            not one.mole_visible[i]
+            or name not in two.mole_ids
+            or not two.mole_visible[two.mole_ids.index(name)]
+        ):
+            continue
+        here, there = one.mole_points_m[i], two.mole_points_m[two.mole_ids.index(name)]
+        carried = bridge.carry(np.asarray(here))
+        if carried is not None and carried.seen:
+            u, v = one.mole_pixels[i]
+            return LesionQuery(name, pixel=(float(u), float(v)), capture="front"), here, there
+    raise AssertionError("no lesion is seen by both")
