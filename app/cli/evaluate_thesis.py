@@ -14,7 +14,7 @@ from core.errors import InputError
 
 if TYPE_CHECKING:
     from core.capture import RgbdCapture
-    from core.evaluation.thesis import StanceSequence
+    from core.evaluation.thesis import Clicks, StanceSequence
     from core.progress import Progress
     from devices.simulator import SimulatedPatient
 
@@ -233,7 +233,9 @@ def _camera_place(patient: SimulatedPatient, stance: str) -> tuple[float, float]
     return framing_distance(standing, patient.rig, patient.room, height) + 0.05, height
 
 
-def _held_capture(patient: SimulatedPatient, stance: str, number: int, place: tuple[float, float]):  # type: ignore[no-untyped-def]
+def _held_capture(
+    patient: SimulatedPatient, stance: str, number: int, place: tuple[float, float]
+) -> tuple[RgbdCapture, Clicks]:
     """One capture of the held stance, and the clicks on its lesions."""
     from core.evaluation.thesis import Clicks
 
