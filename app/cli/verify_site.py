@@ -45,6 +45,7 @@ def verify_site_command(
     from core.capture import read_visit
     from core.relocation import DEFAULT_METHOD, read_lesions, relocate, relocation_method
     from core.relocation.site_check import check_site
+    from core.relocation.view_crossing import Crossing
     from devices.trackers import default_tracker
 
     method = method or DEFAULT_METHOD
@@ -64,12 +65,14 @@ def verify_site_command(
     analysed1 = analyse_capture(first_visit[source], default_tracker())
     analysed2 = analyse_capture(followup_visit[target], default_tracker())
     result = relocate(analysed1, analysed2, queries, method=method, appearance=not no_appearance, seed=seed)
-    lesion = result[lesion_id]
+    crossing = Crossing(analysed1, analysed2)
+    answers = {q.id: crossing.judged(q, result[q.id]) for q in queries}
+    lesion = answers[lesion_id]
     check = check_site(
         lesion,
         analysed2,
         site,
-        others=[x for x in result.lesions if x.id != lesion_id],
+        others=[x for name, x in answers.items() if name != lesion_id],
         first=analysed1,
         query=next(q for q in queries if q.id == lesion_id),
     )

@@ -219,6 +219,7 @@ class LesionSearch:
     def _locate(self, lesion_id: int, capture_id: int, progress: Progress) -> None:
         """Look for a lesion, and for its neighbours in the photo, on a capture; remember the answers."""
         from core.relocation import DEFAULT_METHOD, relocate
+        from core.relocation.view_crossing import Crossing
 
         snapshot = self._snapshot()
         seen = snapshot.previous(lesion_id)
@@ -242,7 +243,10 @@ class LesionSearch:
             progress=ScaledProgress(progress, 0.4, 1.0),
         )
         known = [i for i in queries if self.evidence.answer(i, capture_id) is None]
-        self.evidence.keep(Answer(i, capture_id, result[queries[i].id]) for i in known)
+        crossing = Crossing(first, followup)
+        self.evidence.keep(
+            Answer(i, capture_id, crossing.judged(queries[i], result[queries[i].id])) for i in known
+        )
 
     def _query(self, lesion_id: int, pixel: Pixel) -> LesionQuery:
         from core.relocation import LesionQuery
