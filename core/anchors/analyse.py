@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from core.anchors.calibration import SkeletonCalibration
 from core.anchors.finding import find_skeleton
 from core.anchors.skeleton import Skeleton, SkeletonTracker
 from core.anchors.skin_anchors import AnchorSet, project_to_skin
 from core.capture.rgbd import RgbdCapture
+from core.lesions import SkinSpots, detect_spots
 from core.progress import Progress, ScaledProgress, no_progress
 from core.surface import BodyScan, scan_body
 
@@ -33,6 +35,11 @@ class AnalysedCapture:
     skeleton: Skeleton
     anchors: AnchorSet
     warnings: tuple[str, ...]
+
+    @cached_property
+    def spots(self) -> SkinSpots:
+        """The mole-like spots of the picture, found on first use."""
+        return detect_spots(self.scan)
 
 
 def analyse_capture(

@@ -1,9 +1,9 @@
 """Matching the moles of two visits as a constellation (METHOD sections 3 and 4).
 
-The registration says where every spot of the first visit should appear. What it leaves is a smooth drift: skin
-that slid, a limb that turned. The drift is a Gaussian process over the first skin, learned from spots whose
-counterpart is beyond doubt and extended to the others; where a whole neighbourhood drifted farther than that,
-one pair of spots with its normals gives a local motion, and the neighbours vote on it.
+The registration says where every spot of the first visit should appear. What it leaves is a smooth drift:
+skin that slid, a limb that turned. The drift is a Gaussian process over the first skin, learned from spots
+whose counterpart is beyond doubt and extended to the others; where a whole neighbourhood drifted farther
+than that, one pair of spots with its normals gives a local motion, and the neighbours vote on it.
 """
 
 from __future__ import annotations
@@ -146,7 +146,9 @@ def _consistent(
         if len(rows) < 2:
             break
         drift = spots[partner[rows]] - side.predicted[rows]
-        inverse = np.linalg.inv(_kernel(side.coordinates[rows], side.coordinates[rows], prior) + np.eye(len(rows)) * NOISE_M**2)
+        inverse = np.linalg.inv(
+            _kernel(side.coordinates[rows], side.coordinates[rows], prior) + np.eye(len(rows)) * NOISE_M**2
+        )
         diagonal = np.diag(inverse)
         off = np.linalg.norm(inverse @ drift / diagonal[:, None], axis=1) * np.sqrt(diagonal)
         wrong = (off > GATE) & ~np.isin(rows, list(certain))
@@ -173,7 +175,9 @@ def drift_process(
     return mean, np.sqrt(np.maximum(variance, 1e-9))
 
 
-def vote_locally(side: Side, spots: FloatArray, spot_normals: FloatArray, looks: FloatArray) -> dict[int, int]:
+def vote_locally(
+    side: Side, spots: FloatArray, spot_normals: FloatArray, looks: FloatArray
+) -> dict[int, int]:
     """Matches that whole neighbourhoods agree on, for drifts beyond the gate of `match_spots`."""
     from scipy.spatial import cKDTree
 
@@ -203,7 +207,8 @@ def vote_locally(side: Side, spots: FloatArray, spot_normals: FloatArray, looks:
     )
     votes: dict[tuple[int, int], float] = {}
     for i in np.flatnonzero((best >= 0) & (score > LEAST_SCORE) & (margin > LEAST_SCORE)):
-        votes[i, int(best[i])] = votes.get((i, int(best[i])), 0.0) + 1.0
+        own = (int(i), int(best[i]))
+        votes[own] = votes.get(own, 0.0) + 1.0
         for place in range(start[i], start[i + 1]):
             if partner[place] >= 0:
                 key = (int(neighbours[place]), int(partner[place]))
@@ -223,7 +228,9 @@ def _neighbourhoods(side: Side) -> tuple[IntArray, IntArray]:
 
     tree = cKDTree(side.coordinates)
     distance, index = tree.query(
-        side.coordinates, k=min(MOST_NEIGHBOURS + 1, len(side.coordinates)), distance_upper_bound=NEIGHBOURHOOD_M
+        side.coordinates,
+        k=min(MOST_NEIGHBOURS + 1, len(side.coordinates)),
+        distance_upper_bound=NEIGHBOURHOOD_M,
     )
     keep = np.isfinite(distance) & (index != np.arange(len(index))[:, None])
     start = np.concatenate([[0], np.cumsum(keep.sum(axis=1))]).astype(np.int32)

@@ -54,9 +54,9 @@ def vote_motions(
 ) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
     """For every first-visit spot, the local rigid motion that its neighbourhood explains best.
 
-    A pair of spots and their normals give the motion up to a turn about the normal, which is tried in steps.
-    Under the motion each neighbour either lands on a spot of the follow-up (log-likelihood ratio of hit against
-    chance: ``log(seen / chance)`` minus its misfit) or does not (``log(1 - seen)``).
+    A pair of spots and their normals give the motion up to a turn about the normal, which is tried in
+    steps. Under the motion each neighbour either lands on a spot of the follow-up (log-likelihood ratio of
+    hit against chance: ``log(seen / chance)`` minus its misfit) or does not (``log(1 - seen)``).
 
     Parameters
     ----------
@@ -135,7 +135,9 @@ def vote_motions(
                 for r in range(3):
                     for c in range(3):
                         both[r, c] = (
-                            second[r, 0] * first[0, c] + second[r, 1] * first[1, c] + second[r, 2] * first[2, c]
+                            second[r, 0] * first[0, c]
+                            + second[r, 1] * first[1, c]
+                            + second[r, 2] * first[2, c]
                         )
                 total = -0.5 * drift / (drift_m * drift_m) - 0.5 * (angles[a] / 0.25) ** 2 - 0.5 * looks[i, b]
                 stamp += 1

@@ -28,6 +28,8 @@ ISOMETRY_FLOOR_M = 0.006
 """Spread of a geodesic between two well-placed points: what noise and filtering leave."""
 ISOMETRY_STRETCH = 0.03
 LEAST_SIGMA_M = 0.008
+CERTAIN_M = 0.005
+"""Spread of a lesion that the doctor has confirmed in both visits."""
 HELPER_PRIOR_M = 0.06
 LEAST_ANCHORS_TO_REFINE = 5
 LEAST_HELPERS = 4
@@ -69,23 +71,34 @@ class AnchorNetwork:
 
 def build_network(pair: VisitPair, context: MethodContext) -> AnchorNetwork:
     """Fields of the shared anchors on both surfaces; refined unless the options forbid it."""
-    names = pair.anchor_names
+    network = plain_network(pair, context, pair.anchor_names)
+    if not context.options.refine_anchors or len(network.places) < LEAST_ANCHORS_TO_REFINE:
+        return network
+    context.progress(0.5, "Matching the anchors of both visits")
+    with context.clock.phase("anchors"):
+        return _refined(pair, network)
+
+
+def plain_network(pair: VisitPair, context: MethodContext, names: tuple[str, ...]) -> AnchorNetwork:
+    """Fields of named anchors and of the confirmed lesions on both surfaces, as they were found."""
     surface1, surface2 = pair.first.scan.surface, pair.followup.scan.surface
+    certain1 = {f"lesion {k.id}": k.first for k in context.known}
+    certain2 = {f"lesion {k.id}": k.followup for k in context.known}
     with context.clock.phase("geodesics"):
         places, points = anchor_points(pair.first, names), anchor_points(pair.followup, names)
         first = FIELDS.fields(surface1, places, KIND)
         context.progress(0.3, "Geodesics of the follow-up")
         second = FIELDS.fields(surface2, points, KIND)
-    areas = vertex_areas(surface2.vertices, surface2.triangles)
+        if certain1:
+            first = _joined(first, FIELDS.fields(surface1, certain1, KIND))
+            second = _joined(second, FIELDS.fields(surface2, certain2, KIND))
+    places, points = {**places, **certain1}, {**points, **certain2}
     joints = articulation(pair, bones(pair))
     first = _without_shortcuts(first, places, joints)
+    areas = vertex_areas(surface2.vertices, surface2.triangles)
     field = _skin_field(second, surface2, areas, points, joints)
-    network = AnchorNetwork(first, places, points, field, pair.sigma_m(names), joints)
-    if not context.options.refine_anchors or len(names) < LEAST_ANCHORS_TO_REFINE:
-        return network
-    context.progress(0.5, "Matching the anchors of both visits")
-    with context.clock.phase("anchors"):
-        return _refined(pair, network)
+    sigma = np.concatenate([pair.sigma_m(names), np.full(len(certain1), CERTAIN_M)])
+    return AnchorNetwork(first, places, points, field, sigma, joints)
 
 
 def _refined(pair: VisitPair, network: AnchorNetwork) -> AnchorNetwork:

@@ -12,7 +12,7 @@ from core.relocation.clock import PhaseClock
 from core.relocation.pair import KnownPlace, PickedLesion, VisitPair
 from core.relocation.types import Estimate, RelocationOptions, Spot
 
-DEFAULT_METHOD = "trilateration"
+DEFAULT_METHOD = "fused"
 
 
 @dataclass(frozen=True)
@@ -87,10 +87,24 @@ def _trilateration() -> RelocationMethod:
     return TrilaterationMethod()
 
 
+def _registration() -> RelocationMethod:
+    from core.relocation.registration_methods import RegistrationMethod
+
+    return RegistrationMethod()
+
+
+def _fused() -> RelocationMethod:
+    from core.relocation.registration_methods import FusedMethod
+
+    return FusedMethod()
+
+
 RELOCATION_METHODS: dict[str, RelocationMethodFactory] = {
     "voting-dijkstra": _voting_dijkstra,
     "voting-fmm": _voting_fmm,
     "trilateration": _trilateration,
+    "registration": _registration,
+    "fused": _fused,
 }
 
 

@@ -22,8 +22,10 @@ DOUBT_M = 0.010
 SLIDE = 0.01
 """Weight of the distance along the skin against the one across it: skin may slide on the shape."""
 FACING = 0.2
-"""Cosine to the camera below which carried skin has no counterpart: it has turned out of the view, and the rim
-that it leaves would pull a limb back that has turned about its axis."""
+"""Cosine to the camera below which carried skin has no counterpart.
+
+It has turned out of the view, and the rim that it leaves would pull a limb back that has turned about its axis.
+"""
 TURNING_M2 = 0.1 * 0.045**2
 """Resistance of neighbouring nodes to turning against each other, beside that of their edge to stretching."""
 DAMPING = 1e-4
@@ -207,7 +209,9 @@ class EmbeddedDeformation:
         nearest = target.vertices_within(here, stage.reach_m)
         found = nearest >= 0
         index = np.maximum(nearest, 0)
-        found &= (np.einsum("ki,ki->k", normals, target.normals[index]) > stage.cosine) & ~target.boundary[index]
+        found &= (np.einsum("ki,ki->k", normals, target.normals[index]) > stage.cosine) & ~target.boundary[
+            index
+        ]
         found &= np.einsum("ki,ki->k", normals, here) < -FACING * np.linalg.norm(here, axis=1)
         gap = np.einsum("ki,ki->k", target.normals[index], here - target.vertices[index])
         weight = np.where(found, 1.0 / (1.0 + (gap / DOUBT_M) ** 2), 0.0)
@@ -230,7 +234,16 @@ class EmbeddedDeformation:
             strength = marks.weights * (stage.joints if number == 0 else 1.0)
             nothing = np.zeros(len(rest))
             add_places(
-                rest, carriers, weights, np.zeros_like(rest), marks.targets, nothing, strength, *state, band, right
+                rest,
+                carriers,
+                weights,
+                np.zeros_like(rest),
+                marks.targets,
+                nothing,
+                strength,
+                *state,
+                band,
+                right,
             )
         add_stiffness(
             self._links,
@@ -246,10 +259,16 @@ class EmbeddedDeformation:
         )
         band[0] += DAMPING
         try:
-            step = solveh_banded(band, right, overwrite_ab=True, overwrite_b=True, lower=True, check_finite=False)
+            step = solveh_banded(
+                band, right, overwrite_ab=True, overwrite_b=True, lower=True, check_finite=False
+            )
         except LinAlgError as error:
             raise WorkError("The registration of the two surfaces did not converge.") from error
         apply_step(step, self.rotation, self.node_now)
         moved = float(np.abs(step.reshape(-1, 6)[:, 3:]).max(initial=0.0))
-        rms = float(np.sqrt(np.mean(np.minimum(np.abs(gap[found]), 0.03) ** 2))) if found.any() else float("inf")
+        rms = (
+            float(np.sqrt(np.mean(np.minimum(np.abs(gap[found]), 0.03) ** 2)))
+            if found.any()
+            else float("inf")
+        )
         return Fit(rms, float(found.mean()) if len(found) else 0.0), moved

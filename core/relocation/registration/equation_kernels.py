@@ -1,8 +1,8 @@
 """Compiled normal equations of embedded deformation, straight into banded storage. Imported only when used.
 
 Node k turns by a small rotation ``omega_k`` and shifts by ``t_k``. A place ``y = sum_k w_k (R_k (p - g_k) +
-x_k)`` then moves by ``sum_k w_k (omega_k x a_k + t_k)`` with ``a_k = R_k (p - g_k)``. The matrix keeps its lower
-half as ``band[i - j, j]``, six unknowns per node; it is 95 % zeros outside the band.
+x_k)`` then moves by ``sum_k w_k (omega_k x a_k + t_k)`` with ``a_k = R_k (p - g_k)``. The matrix keeps its
+lower half as ``band[i - j, j]``, six unknowns per node; it is 95 % zeros outside the band.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ def warp_places(
 
 
 @njit(cache=True, nogil=True)
-def turn_normals(normals: FloatArray, carriers: IntArray, weights: FloatArray, rotation: FloatArray) -> FloatArray:
+def turn_normals(
+    normals: FloatArray, carriers: IntArray, weights: FloatArray, rotation: FloatArray
+) -> FloatArray:
     """Unit normals (k, 3) turned by the weighted rotations of their nodes."""
     out = np.zeros((len(normals), 3))
     for i in range(len(normals)):
@@ -133,7 +135,13 @@ def add_places(
 
 @njit(cache=True, nogil=True)
 def _add_rows(
-    jacobian: FloatArray, residual: FloatArray, weight: float, i: int, j: int, band: FloatArray, right: FloatArray
+    jacobian: FloatArray,
+    residual: FloatArray,
+    weight: float,
+    i: int,
+    j: int,
+    band: FloatArray,
+    right: FloatArray,
 ) -> None:
     """Add ``weight |J (u_i, u_j) + residual|^2`` for three rows over the unknowns of two nodes, J (3, 12)."""
     for k in range(12):
@@ -181,11 +189,12 @@ def add_stiffness(
 ) -> None:
     """Add ``weight sum_ij phi_ij |(R_i + R_j) / 2 (g_j - g_i) + x_i - x_j|^2`` and a resistance to turning.
 
-    An edge over a bent elbow is half of the upper arm and half of the forearm: with the mean of both rotations
-    a bend costs nothing, where the one-sided form (Sumner 2007) must break the edge. ``phi = 1 / (1 +
-    |residual|^2 / slip^2)^2`` lets go of edges that are stretched nevertheless. What a node turns beyond the
-    skeleton's turn ``start`` should be what its neighbours turn: ``weight turning |log S_i S_j^T|^2`` with
-    ``S = R start^T`` keeps a limb from rolling about its axis, which no surface of its shape would resist.
+    An edge over a bent elbow is half of the upper arm and half of the forearm: with the mean of both
+    rotations a bend costs nothing, where the one-sided form (Sumner 2007) must break the edge. ``phi = 1 /
+    (1 + |residual|^2 / slip^2)^2`` lets go of edges that are stretched nevertheless. What a node turns
+    beyond the skeleton's turn ``start`` should be what its neighbours turn: ``weight turning |log S_i
+    S_j^T|^2`` with ``S = R start^T`` keeps a limb from rolling about its axis, which no surface of its
+    shape would resist.
     """
     jacobian = np.zeros((3, 12))
     residual = np.empty(3)

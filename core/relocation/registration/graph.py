@@ -1,7 +1,8 @@
 """The deformation graph: a few hundred nodes on the skin that carry all other skin with them.
 
 Embedded deformation (Sumner, Schmid and Pauly 2007): nodes every 45 mm, every place of the skin follows its
-five nearest nodes along the skin, so that an arm beside the trunk does not hang on the trunk (METHOD section 3).
+five nearest nodes along the skin, so that an arm beside the trunk does not hang on the trunk (METHOD
+section 3).
 """
 
 from __future__ import annotations
@@ -79,7 +80,9 @@ class DeformationGraph:
         distance = np.take_along_axis(distance, order, axis=1)
         finite = np.where(np.isfinite(distance), distance, 0.0)
         farthest = np.where(np.isfinite(distance[:, -1]), distance[:, -1], 1.1 * finite.max(axis=1)) + 1e-6
-        weight = np.where(around[:, :-1] >= 0, (1.0 - np.minimum(distance[:, :-1] / farthest[:, None], 1.0)) ** 2, 0)
+        weight = np.where(
+            around[:, :-1] >= 0, (1.0 - np.minimum(distance[:, :-1] / farthest[:, None], 1.0)) ** 2, 0
+        )
         total = weight.sum(axis=1, keepdims=True)
         weight = np.where(total > 0, weight / np.maximum(total, 1e-12), 0.0)
         alone = total[:, 0] <= 0
@@ -163,7 +166,7 @@ def _links(
 def _bridges(
     pairs: NDArray[np.int64], places: FloatArray, owner: NDArray[np.intp] | None, skeleton: tuple[Bone, ...]
 ) -> NDArray[np.int64]:
-    """Edges from nodes of smaller pieces to the nearest nodes of other pieces, of the same or the next bone."""
+    """Edges from nodes of smaller pieces to the nearest nodes of others, of the same or the next bone."""
     from scipy.sparse.csgraph import connected_components
 
     count = len(places)
@@ -187,7 +190,7 @@ def _bridges(
 
 def _short_band(links: IntArray, near: IntArray, count: int) -> NDArray[np.int64]:
     """New number of every node such that nodes that meet in an equation have near numbers."""
-    group = near[:, : CARRIERS]
+    group = near[:, :CARRIERS]
     one = np.repeat(group[:, :1], CARRIERS - 1, axis=1).ravel()
     two = group[:, 1:].ravel()
     keep = (one >= 0) & (two >= 0)

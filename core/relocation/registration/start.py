@@ -17,7 +17,7 @@ BLEND = 0.35
 HAND_SHARE = 0.35
 """A forearm reaches this share of its length beyond the middle of the hand."""
 BENT_FROM, BENT_FULLY = 0.20, 0.35
-"""Sine of the bend of elbow or knee from which on its plane tells the twist of the limb, and tells it fully."""
+"""Sine of an elbow's or knee's bend from which on its plane tells the limb's twist, and tells it fully."""
 MOST_TWIST_RAD = 2.0
 
 
@@ -29,7 +29,7 @@ class SkeletonStart:
 
     def __call__(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rotations (k, 3, 3) and new places (k, 3) of first-visit places (k, 3)."""
-        distance = np.stack([_off(places, b) / b.radius_m for b in self.bones])
+        distance = np.stack([off_bone(places, b) / b.radius_m for b in self.bones])
         weight = np.exp(-(((distance - distance.min(axis=0)) / BLEND) ** 2))
         weight /= weight.sum(axis=0)
         moved = np.zeros_like(places)
@@ -39,7 +39,7 @@ class SkeletonStart:
         return nearest_rotations(mixed), moved
 
 
-def _off(places: FloatArray, bone: Bone) -> FloatArray:
+def off_bone(places: FloatArray, bone: Bone) -> FloatArray:
     """Distance (k,) of places from a bone's segment."""
     along = bone.end - bone.start
     square = max(float(along @ along), 1e-12)
@@ -122,7 +122,7 @@ def _twisted(pair: VisitPair, rotation: FloatArray, near: Bone, far: Bone) -> Fl
 
 
 def _bending(joints: list[FloatArray], natural: FloatArray | None) -> tuple[FloatArray, float] | None:
-    """Direction (3,) into which a limb of three joints bends, across its upper half, and how far to trust it."""
+    """Direction (3,) into which a limb of three joints bends, across its upper half, and its trust 0..1."""
     start, middle, tip = joints
     axis = (middle - start) / np.linalg.norm(middle - start)
     lower = (tip - middle) / np.linalg.norm(tip - middle)

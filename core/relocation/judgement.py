@@ -1,0 +1,196 @@
+"""From carried skin and matched moles to one estimate per lesion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.relocation.calibration95 import Kind, factor95
+from core.relocation.pair import VisitPair
+from core.relocation.posterior import radius95_m
+from core.relocation.shortcuts import owners
+from core.relocation.sight import Sight, look_at
+from core.relocation.spread import (
+    SEEN_M,
+    Part,
+    Spread,
+    body_part,
+    carried_spread,
+    region_of,
+    skin_basis,
+)
+from core.relocation.tangent import tangent_basis
+from core.relocation.transfer import Transfer
+from core.relocation.trilateration import Fix
+from core.relocation.types import Candidate, Estimate
+
+FloatArray = NDArray[np.float64]
+
+AGAIN = 0.85
+"""Probability that a mole of the first visit is detected in the follow-up when it is in view."""
+SURE, POSSIBLE = 0.5, 0.2
+"""Posterior of the best spot from which on it counts as seen again, and of others worth telling."""
+REACH = 3.5
+CONFIDENT_M = 0.010
+"""`Estimate.confidence` is the probability that the answer is nearer to the truth than this."""
+GEODESIC_LEAST_M = 0.015
+"""Geodesic fixes are never believed to be finer."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Spots that may be the lesion, with their probabilities, likeliest first."""
+
+    rows: NDArray[np.int64]
+    probability: FloatArray
+
+
+def judge(pair: VisitPair, transfer: Transfer, fixes: tuple[Fix | None, ...] | None) -> tuple[Estimate, ...]:
+    """One estimate per lesion of a transfer.
+
+    Parameters
+    ----------
+    fixes : tuple of Fix or None, optional
+        What geodesic trilateration says about each lesion; without it the registration stands alone.
+    """
+    count = transfer.moles.lesions
+    surface = pair.followup.scan.surface
+    sight = look_at(transfer.carried[:count], transfer.normals[:count], surface, pair.followup.capture.rig)
+    return tuple(
+        _judge_one(pair, transfer, row, sight, None if fixes is None else fixes[row]) for row in range(count)
+    )
+
+
+def _judge_one(pair: VisitPair, transfer: Transfer, row: int, sight: Sight, fix: Fix | None) -> Estimate:
+    surface = pair.followup.scan.surface
+    skeleton = transfer.start.bones
+    place = transfer.moles.places[row]
+    part = body_part(place, skeleton)
+    bone = skeleton[int(owners(skeleton, place[None])[0])]
+    seen = _possible_spots(transfer, row)
+    partner = int(transfer.matching.partner[row])
+    if partner >= 0 and len(seen.rows) and seen.rows[0] == partner and seen.probability[0] >= SURE:
+        return _seen_again(transfer, row, part, partner, seen, fix)
+    expected = transfer.matching.expected[row]
+    on_skin = surface.nearest(expected)[0]
+    normal = surface.normal_at(on_skin)
+    spread = carried_spread(
+        part,
+        transfer.other_stance,
+        float(transfer.matching.sigma_m[row]),
+        float(sight.off_m[row]),
+        float(sight.cosine[row]),
+        skin_basis(normal, part, bone),
+    )
+    point, covariance, agreement, reason = _fused(on_skin.position_m, spread, fix)
+    if fix is not None:
+        on_skin = surface.nearest(point)[0]
+    kind: Kind = "matched" if len(transfer.spots) else "geometry"
+    region, radius = region_of(spread.basis, covariance, factor95(kind, transfer.other_stance, part))
+    return Estimate(
+        point_m=on_skin.position_m,
+        radius95_m=radius,
+        confidence=_within(CONFIDENT_M, covariance),
+        vertex=int(surface.nearest_vertex(on_skin.position_m)[0]),
+        hidden=sight.hidden[row],
+        candidates=_candidates(transfer, seen),
+        region=region,
+        reason=reason,
+        agreement_m=agreement,
+    )
+
+
+def _seen_again(
+    transfer: Transfer, row: int, part: Part, partner: int, seen: _Seen, fix: Fix | None
+) -> Estimate:
+    spots = transfer.spots
+    point = spots.points_m[partner]
+    steep = 1.0 / float(np.clip(-(spots.normals[partner] @ point) / np.linalg.norm(point), 0.3, 1.0))
+    spread = Spread(tangent_basis(spots.normals[partner]), (SEEN_M * steep, SEEN_M * steep))
+    region, radius = region_of(
+        spread.basis, spread.covariance(), factor95("seen", transfer.other_stance, part)
+    )
+    agreement, reason = None, "Seen again in the picture."
+    if fix is not None:
+        agreement = float(np.linalg.norm(fix.point_m - point))
+        if agreement > radius95_m(fix) + radius:
+            reason = f"Seen again in the picture, but {_disagreement(agreement)}"
+    return Estimate(
+        point_m=point,
+        radius95_m=radius,
+        confidence=float(seen.probability[0]) * _within(CONFIDENT_M, spread.covariance()),
+        vertex=-1,
+        candidates=_candidates(transfer, _Seen(seen.rows[1:], seen.probability[1:])),
+        region=region,
+        reason=reason,
+        appearance_matched=True,
+        pixel=(float(spots.pixels[partner, 0]), float(spots.pixels[partner, 1])),
+        agreement_m=agreement,
+    )
+
+
+def _possible_spots(transfer: Transfer, row: int) -> _Seen:
+    """Posterior of each spot near the expected place; spots that are surely others are left out."""
+    spots, matching = transfer.spots, transfer.matching
+    nothing = _Seen(np.zeros(0, np.int64), np.zeros(0))
+    if len(spots) == 0:
+        return nothing
+    sigma = float(matching.sigma_m[row])
+    square = ((spots.points_m - matching.expected[row]) ** 2).sum(axis=1) / sigma**2
+    near = square < REACH**2
+    others = matching.partner[matching.sure & (np.arange(len(matching.partner)) != row)]
+    near[others[others >= 0]] = False
+    rows = np.flatnonzero(near)
+    if len(rows) == 0:
+        return nothing
+    density = len(spots) / max(float(np.pi * transfer.extent_m**2), 0.05)
+    ratio = (
+        AGAIN / (2.0 * np.pi * sigma**2 * density) * np.exp(-0.5 * (square[rows] + transfer.looks[row, rows]))
+    )
+    probability = ratio / (ratio.sum() + 1.0 - AGAIN)
+    order = np.argsort(-probability)
+    return _Seen(rows[order], probability[order])
+
+
+def _candidates(transfer: Transfer, seen: _Seen) -> tuple[Candidate, ...]:
+    return tuple(
+        Candidate(transfer.spots.points_m[r], float(p))
+        for r, p in zip(seen.rows[:3], seen.probability[:3], strict=True)
+        if p >= POSSIBLE
+    )
+
+
+def _fused(
+    point: FloatArray, spread: Spread, fix: Fix | None
+) -> tuple[FloatArray, FloatArray, float | None, str]:
+    """Registered and geodesic estimates in one: place, covariance (2, 2), their distance, what to say."""
+    reason = "Carried over by the shape of the skin and the moles around; not seen itself."
+    covariance = spread.covariance()
+    if fix is None:
+        return point, covariance, None, reason
+    between = fix.point_m - point
+    agreement = float(np.linalg.norm(between))
+    if agreement > radius95_m(fix) + 2.5 * spread.mean_m:
+        return (
+            point,
+            covariance,
+            agreement,
+            f"Carried over by the shape of the skin, but {_disagreement(agreement)}",
+        )
+    geodesic = spread.basis @ fix.covariance @ spread.basis.T + np.eye(2) * GEODESIC_LEAST_M**2
+    one, two = np.linalg.inv(covariance), np.linalg.inv(geodesic)
+    both = np.linalg.inv(one + two)
+    step = both @ two @ (spread.basis @ between)
+    return point + step @ spread.basis, both, agreement, reason
+
+
+def _disagreement(distance_m: float) -> str:
+    return f"distances along the skin point to a place {1000 * distance_m:.0f} mm away."
+
+
+def _within(radius_m: float, covariance: FloatArray) -> float:
+    """Probability of lying within a radius under a normal law, by its mean spread."""
+    mean = 0.5 * float(np.trace(covariance))
+    return float(1.0 - np.exp(-0.5 * radius_m**2 / max(mean, 1e-12)))
