@@ -15,8 +15,8 @@ from app.windows.visit.pieces import segment
 from app.windows.visit.side_panel import wrapped
 
 _TEXT = (
-    "Distances along the skin to the joints start the search and check its answer: each joint marks a band of "
-    "skin at the distance measured at the previous visit, and the place should lie where the bands meet."
+    "Distances along the skin to the joints start the search and check its answer: each joint marks a band "
+    "of skin at the distance measured at the previous visit, and the place should lie where the bands meet."
 )
 
 
