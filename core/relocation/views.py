@@ -87,6 +87,11 @@ class BoneBridge:
         pair = VisitPair(source, target)
         self._bones: tuple[Bone, ...] = bones(pair) if is_rigid(pair) else ()
 
+    @property
+    def carries(self) -> bool:
+        """Whether the skeletons fit well enough to carry anything."""
+        return bool(self._bones)
+
     def carry(self, point_m: FloatArray) -> Carried | None:
         """The place in the target; None where the skeletons cannot tell."""
         if not self._bones:

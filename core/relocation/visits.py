@@ -24,7 +24,7 @@ from core.relocation.types import (
     RelocationResult,
 )
 from core.relocation.view_choice import best_of_views, is_settled
-from core.relocation.view_crossing import Crossing
+from core.relocation.view_crossing import UNKNOWN, Crossing
 from core.relocation.view_spots import PairSpots, SpotsOfVisits
 from core.relocation.views import is_rigid, opposite, turn_deg
 from core.relocation.visibility import turned_away
@@ -117,12 +117,19 @@ class _Search:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     spots: list[PairSpots] = field(default_factory=list)
+    crossings: dict[tuple[str, str], Crossing] = field(default_factory=dict)
 
     def wanted(self, a: str, b: str, options: RelocationOptions) -> list[LesionQuery]:
         """Lesions of ``a`` worth searching in ``b``; for those whose skin ``b`` cannot see, the answer."""
         waiting = [q for q in self.queries if self.owners[q.id] == a and q.id not in self.settled]
         if not waiting or not any(self.answers.get(q.id) for q in waiting):
             return waiting
+        if self._crossing(a, b).is_blocked:
+            for query in waiting:
+                self.answers[query.id].append(
+                    RelocatedLesion(query.id, "refused", UNKNOWN, capture=b, picture=self._picture(b))
+                )
+            return []
         pair = VisitPair(self.first[a], self.followup[b])
         angle = turn_deg(pair)
         skeleton = bones(pair) if options.check_visibility and is_rigid(pair) else ()
@@ -153,6 +160,11 @@ class _Search:
             return "refused", ""  # what refused elsewhere, perhaps another person, is judged here, too
         return "not_visible", turned_away(PickedLesion(query, pick.point, pick.normal), skeleton)
 
+    def _crossing(self, a: str, b: str) -> Crossing:
+        if (a, b) not in self.crossings:
+            self.crossings[a, b] = Crossing(self.first[a], self.followup[b])
+        return self.crossings[a, b]
+
     def _picture(self, b: str) -> Literal["color", "depth"]:
         return "color" if self.followup[b].capture.rig.has_color else "depth"
 
@@ -161,8 +173,9 @@ class _Search:
         for name, value in result.seconds.items():
             self.seconds[name] = self.seconds.get(name, 0.0) + value
         self.warnings += [self._told(a, b, warning) for warning in result.warnings]
-        self.spots.append(PairSpots(a, b, result.new_spots, result.vanished_spots))
-        crossing = Crossing(self.first[a], self.followup[b])
+        if not self._crossing(a, b).is_blocked:
+            self.spots.append(PairSpots(a, b, result.new_spots, result.vanished_spots))
+        crossing = self._crossing(a, b)
         queries = {q.id: q for q in self.queries}
         for lesion in result.lesions:
             answer = crossing.judged(queries[lesion.id], replace(lesion, capture=b))
