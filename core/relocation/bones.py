@@ -15,12 +15,13 @@ TORSO = ("neck", "torso", "left_shoulder", "right_shoulder", "left_hip", "right_
 RADIUS_M = {"torso": 0.15, "upper": 0.09, "fore": 0.06}
 """Usual radii of body parts: a place belongs to the bone nearest in these units (METHOD section 3)."""
 
-_LIMBS = (
+LIMB_BONES = (
     ("left_shoulder", "left_elbow", "left_hand", 0.09, 0.06),
     ("right_shoulder", "right_elbow", "right_hand", 0.09, 0.06),
     ("left_hip", "left_knee", "left_foot", 0.09, 0.09),
     ("right_hip", "right_knee", "right_foot", 0.09, 0.09),
 )
+"""Joints of every limb from the trunk outward, and the usual radii of its two segments in metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ def bones(pair: VisitPair) -> tuple[Bone, ...]:
     centre1, centre2 = joints[0].mean(axis=0), joints[1].mean(axis=0)
     shared = set(pair.first.skeleton.visible()) & set(pair.followup.skeleton.visible())
     out = [_trunk(pair, shared, rotation, centre1, centre2)]
-    for root, middle, tip, thick, thin in _LIMBS:
+    for root, middle, tip, thick, thin in LIMB_BONES:
         parent, parent_bone = rotation, 0
         for near, far, radius in ((root, middle, thick), (middle, tip, thin)):
             if near not in shared or far not in shared:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from core.relocation.bones import Bone
 from core.relocation.calibration95 import Kind, factor95
 from core.relocation.pair import VisitPair
 from core.relocation.posterior import radius95_m
-from core.relocation.shortcuts import owners
 from core.relocation.sight import Sight, look_at
 from core.relocation.spread import (
     SEEN_M,
@@ -65,14 +65,16 @@ def judge(pair: VisitPair, transfer: Transfer, fixes: tuple[Fix | None, ...] | N
 
 def _judge_one(pair: VisitPair, transfer: Transfer, row: int, sight: Sight, fix: Fix | None) -> Estimate:
     surface = pair.followup.scan.surface
-    skeleton = transfer.start.bones
     place = transfer.moles.places[row]
-    part = body_part(place, skeleton)
-    bone = skeleton[int(owners(skeleton, place[None])[0])]
+    number = int(transfer.start.owners.at(place[None])[0])
+    bone = transfer.start.bones[number]
+    part = body_part(bone)
     seen = _possible_spots(transfer, row)
     partner = int(transfer.matching.partner[row])
     if partner >= 0 and len(seen.rows) and seen.rows[0] == partner and seen.probability[0] >= SURE:
         return _seen_again(transfer, row, part, partner, seen, fix)
+    if number in transfer.start.lost:
+        return Estimate(None, hidden=sight.hidden[row], reason=_not_found(bone))
     expected = transfer.matching.expected[row]
     on_skin = surface.nearest(expected)[0]
     normal = surface.normal_at(on_skin)
@@ -184,6 +186,11 @@ def _fused(
     both = np.linalg.inv(one + two)
     step = both @ two @ (spread.basis @ between)
     return point + step @ spread.basis, both, agreement, reason
+
+
+def _not_found(bone: Bone) -> str:
+    side = bone.name.split("_")[0]
+    return f"The {side} {body_part(bone)} was not found in the follow-up; what lies on it cannot be placed."
 
 
 def _disagreement(distance_m: float) -> str:

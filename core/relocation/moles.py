@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from core.lesions import SkinSpots, spot_at
 from core.lesions.appearance import appearance_distance
-from core.relocation.bones import Bone
 from core.relocation.pair import KnownPlace, PickedLesion
-from core.relocation.registration.start import BLEND, off_bone
+from core.relocation.registration.start import SkeletonStart
 from core.surface import BodySurface
 
 FloatArray = NDArray[np.float64]
@@ -75,7 +74,7 @@ def gather_moles(
     known: Sequence[KnownPlace],
     spots: SkinSpots,
     surface: BodySurface,
-    skeleton: tuple[Bone, ...],
+    start: SkeletonStart,
 ) -> FirstMoles:
     """Lesions, confirmed lesions, and every other spot of the first visit.
 
@@ -105,18 +104,15 @@ def gather_moles(
     return FirstMoles(
         every,
         np.array([*normals, *spots.normals[rest]]).reshape(-1, 3),
-        limb_coordinates(every, skeleton),
+        limb_coordinates(every, start),
         np.array([*row, *rest], np.int64),
         len(lesions),
         healed,
     )
 
 
-def limb_coordinates(places: FloatArray, skeleton: tuple[Bone, ...]) -> FloatArray:
+def limb_coordinates(places: FloatArray, start: SkeletonStart) -> FloatArray:
     """Places (m, 3) with one more coordinate per bone: how much they belong to it."""
-    if not skeleton or len(places) == 0:
-        return places
-    distance = np.stack([off_bone(places, b) / b.radius_m for b in skeleton])
-    share = np.exp(-(((distance - distance.min(axis=0)) / BLEND) ** 2))
-    share /= share.sum(axis=0)
-    return np.hstack([places, LIMB_APART_M * share.T])
+    if len(places) == 0:
+        return np.zeros((0, 3 + len(start.bones)))
+    return np.hstack([places, LIMB_APART_M * start.shares(places).T])

@@ -180,6 +180,8 @@ def _answer(
 ) -> RelocatedLesion:
     query = lesion.query
     if estimate.point_m is None:
+        if options.check_visibility and estimate.hidden:
+            return RelocatedLesion(query.id, "not_visible", estimate.hidden)
         return _refused(query, estimate.reason or "The evidence carries no answer.")
     if options.check_visibility and not estimate.appearance_matched:
         hidden = estimate.hidden or turned_away(lesion, skeleton)

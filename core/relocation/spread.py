@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.relocation.bones import Bone
-from core.relocation.shortcuts import owners
 from core.relocation.tangent import tangent_basis
 from core.relocation.types import Region
 
@@ -77,9 +76,9 @@ class Spread:
         return np.diag(np.square(self.sigma_m))
 
 
-def body_part(place: FloatArray, skeleton: tuple[Bone, ...]) -> Part:
-    """The part of the body that a place of the first visit lies on."""
-    name = skeleton[int(owners(skeleton, place[None])[0])].name
+def body_part(bone: Bone) -> Part:
+    """The part of the body that a bone carries."""
+    name = bone.name
     return _PARTS[name.replace("left_", "").replace("right_", "")]
 
 

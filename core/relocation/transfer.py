@@ -93,9 +93,7 @@ def transfer_skin(
         with context.clock.phase("spots"):
             first_spots, spots = usable(pair.first.spots), usable(pair.followup.spots)
     with context.clock.phase("matching"):
-        moles = gather_moles(
-            lesions, context.known, first_spots, pair.first.scan.surface, registration.start.bones
-        )
+        moles = gather_moles(lesions, context.known, first_spots, pair.first.scan.surface, registration.start)
         engine = _Matcher(pair, registration, moles, spots, moles.looks(first_spots, spots), DRIFT_M[other])
         engine.hold(lesions, context)
         for turn in range(ROUNDS if len(spots) else 0):

@@ -24,7 +24,7 @@ SLIDE = 0.01
 FACING = 0.2
 """Cosine to the camera below which carried skin has no counterpart.
 
-It has turned out of the view, and the rim that it leaves would pull a limb back that has turned about its axis.
+It has turned out of the view; the rim that it leaves would pull a limb back that has turned about its axis.
 """
 TURNING_M2 = 0.1 * 0.045**2
 """Resistance of neighbouring nodes to turning against each other, beside that of their edge to stretching."""

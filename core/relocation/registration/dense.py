@@ -11,7 +11,7 @@ from threadpoolctl import ThreadpoolController
 
 from core.relocation.pair import VisitPair
 from core.relocation.registration.deformation import EmbeddedDeformation, Fit, Landmarks, Stage
-from core.relocation.registration.graph import build_graph
+from core.relocation.registration.graph import SkinNet, build_graph, skin_net
 from core.relocation.registration.start import SkeletonStart, skeleton_start
 from core.relocation.trilateration import vertex_areas
 
@@ -39,17 +39,19 @@ class DenseRegistration:
     Parameters
     ----------
     pair : VisitPair
+    net : SkinNet
+        Of the first skin.
     start : SkeletonStart
     seed : int
         Of the choice of nodes.
     """
 
-    def __init__(self, pair: VisitPair, start: SkeletonStart, *, seed: int = 0) -> None:
+    def __init__(self, pair: VisitPair, net: SkinNet, start: SkeletonStart, *, seed: int = 0) -> None:
         self.start = start
         self._target = pair.followup.scan.surface
         self._joints = joint_landmarks(pair)
         with one_linear_algebra_thread():
-            graph = build_graph(pair.first.scan.surface, start.bones, seed=seed)
+            graph = build_graph(net, start.owners, seed=seed)
             self.deformation = EmbeddedDeformation(graph, start)
             self.deformation.solve(self._target, FIRST_STAGES, self._joints)
             self.deformation.return_to_rest()
@@ -68,8 +70,9 @@ class DenseRegistration:
 
 def register_skins(pair: VisitPair, *, seed: int = 0) -> DenseRegistration | None:
     """Register the first skin to the follow-up's; None without a trunk to start from."""
-    start = skeleton_start(pair)
-    return None if start is None else DenseRegistration(pair, start, seed=seed)
+    net = skin_net(pair.first.scan.surface)
+    start = skeleton_start(pair, net.places, net.edges)
+    return None if start is None else DenseRegistration(pair, net, start, seed=seed)
 
 
 def one_linear_algebra_thread() -> AbstractContextManager[object]:

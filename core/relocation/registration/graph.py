@@ -15,8 +15,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.spatial import cKDTree
 
-from core.relocation.bones import Bone
-from core.relocation.shortcuts import owners
+from core.relocation.registration.patches import SkinOwners, near_bones
 from core.surface import BodySurface
 
 FloatArray = NDArray[np.float64]
@@ -91,25 +90,52 @@ class DeformationGraph:
         return carriers.astype(np.int32), np.ascontiguousarray(weight)
 
 
-def build_graph(
-    surface: BodySurface, skeleton: tuple[Bone, ...], *, spacing_m: float = SPACING_M, seed: int = 0
-) -> DeformationGraph:
-    """Lay a graph over a surface; skin of bones that are no neighbours is not joined, though it may touch."""
-    from core.relocation.registration.graph_kernels import coarse_edges, nearest_nodes, poisson_nodes
+@dataclass(frozen=True, eq=False)
+class SkinNet:
+    """A surface sampled on a coarser grid, joined along the skin.
+
+    Attributes
+    ----------
+    surface : BodySurface
+    samples : ndarray (s,)
+        Vertices.
+    edges : ndarray (e, 2), lengths_m : ndarray (e,)
+    """
+
+    surface: BodySurface
+    samples: NDArray[np.int64]
+    edges: IntArray
+    lengths_m: FloatArray
+
+    @property
+    def places(self) -> FloatArray:
+        """Positions (s, 3) of the samples."""
+        return self.surface.vertices[self.samples]
+
+
+def skin_net(surface: BodySurface) -> SkinNet:
+    """Sample a surface."""
+    from core.relocation.registration.graph_kernels import coarse_edges
 
     step = max(1, round(np.sqrt(len(surface.vertices) / SAMPLES)))
-    on_grid = (surface.pixels % step == 0).all(axis=1)
-    samples = np.flatnonzero(on_grid)
+    samples = np.flatnonzero((surface.pixels % step == 0).all(axis=1))
     number = np.full(len(surface.vertices), -1, np.int32)
     number[samples] = np.arange(len(samples), dtype=np.int32)
-    places = surface.vertices[samples]
     edges, length = coarse_edges(surface.vertices, surface.vertex_of_pixel, number, step, JUMP_M)
-    if skeleton:
-        owner = owners(skeleton, places)
-        apart = ~_near_bones(skeleton)[owner[edges[:, 0]], owner[edges[:, 1]]]
-        edges, length = edges[~apart], length[~apart]
-    adjacency = _adjacency(edges, length, len(samples))
-    order = np.random.default_rng(seed).permutation(len(samples))
+    return SkinNet(surface, samples, edges, length)
+
+
+def build_graph(
+    net: SkinNet, owners: SkinOwners, *, spacing_m: float = SPACING_M, seed: int = 0
+) -> DeformationGraph:
+    """Lay a graph over a surface; skin of bones that are no neighbours is not joined, though it may touch."""
+    from core.relocation.registration.graph_kernels import nearest_nodes, poisson_nodes
+
+    places, owner = net.places, owners.of_samples
+    near_bone = near_bones(owners.skeleton)
+    joined = near_bone[owner[net.edges[:, 0]], owner[net.edges[:, 1]]]
+    adjacency = _adjacency(net.edges[joined], net.lengths_m[joined], len(places))
+    order = np.random.default_rng(seed).permutation(len(places))
     nodes = poisson_nodes(places, order, spacing_m)
     near, _ = nearest_nodes(
         adjacency.indptr, adjacency.indices, adjacency.data, nodes, NEIGHBOURS + 1, 4 * spacing_m
@@ -117,15 +143,15 @@ def build_graph(
     lost = np.flatnonzero(near[:, 0] < 0)
     if len(lost):
         near[lost, 0] = cKDTree(places[nodes]).query(places[lost])[1]
-    links = _links(near[nodes], places[nodes], owner[nodes] if skeleton else None, skeleton)
+    links = _links(near[nodes], places[nodes], owner[nodes], near_bone)
     rank = _short_band(links, near, len(nodes))
     renumbered = np.where(near >= 0, rank[np.maximum(near, 0)], -1).astype(np.int32)
     kept = np.empty_like(nodes)
     kept[rank] = nodes
     return DeformationGraph(
-        surface,
-        samples,
-        ~surface.boundary[samples],
+        net.surface,
+        net.samples,
+        ~net.surface.boundary[net.samples],
         kept,
         renumbered,
         np.ascontiguousarray(rank[links].astype(np.int32)),
@@ -140,18 +166,8 @@ def _adjacency(edges: IntArray, length: FloatArray, count: int) -> csr_matrix:
     return out
 
 
-def _near_bones(skeleton: tuple[Bone, ...]) -> NDArray[np.bool_]:
-    """Which bones (b, b) share a joint, or are one."""
-    count = len(skeleton)
-    out = np.eye(count, dtype=bool)
-    for i, bone in enumerate(skeleton):
-        if bone.parent is not None:
-            out[i, bone.parent] = out[bone.parent, i] = True
-    return out
-
-
 def _links(
-    near: IntArray, places: FloatArray, owner: NDArray[np.intp] | None, skeleton: tuple[Bone, ...]
+    near: IntArray, places: FloatArray, owner: NDArray[np.intp], near_bone: NDArray[np.bool_]
 ) -> IntArray:
     """Edges between nodes, both directions: neighbours along the skin, and bridges between its pieces."""
     count = len(near)
@@ -159,12 +175,12 @@ def _links(
     two = near.ravel()
     keep = (two >= 0) & (two != one)
     pairs = np.stack([one[keep], two[keep]], axis=1)
-    pairs = np.concatenate([pairs, pairs[:, ::-1], _bridges(pairs, places, owner, skeleton)])
+    pairs = np.concatenate([pairs, pairs[:, ::-1], _bridges(pairs, places, owner, near_bone)])
     return np.unique(pairs, axis=0).astype(np.int32)
 
 
 def _bridges(
-    pairs: NDArray[np.int64], places: FloatArray, owner: NDArray[np.intp] | None, skeleton: tuple[Bone, ...]
+    pairs: NDArray[np.int64], places: FloatArray, owner: NDArray[np.intp], near_bone: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Edges from nodes of smaller pieces to the nearest nodes of others, of the same or the next bone."""
     from scipy.sparse.csgraph import connected_components
@@ -175,12 +191,9 @@ def _bridges(
     if pieces < 2:
         return np.empty((0, 2), np.int64)
     largest = np.bincount(piece).argmax()
-    allowed = _near_bones(skeleton) if skeleton else None
     out = []
     for i in np.flatnonzero(piece != largest):
-        other = piece != piece[i]
-        if allowed is not None and owner is not None:
-            other &= allowed[owner[i], owner]
+        other = (piece != piece[i]) & near_bone[owner[i], owner]
         distance = np.where(other, np.linalg.norm(places - places[i], axis=1), np.inf)
         for j in np.argsort(distance)[:2]:
             if distance[j] < BRIDGE_M:

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from core.relocation.bones import Bone, bones, minimal_rotation
+from core.relocation.bones import LIMB_BONES, Bone, bones, minimal_rotation
 from core.relocation.pair import VisitPair
+from core.relocation.registration.patches import SkinOwners
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
 
 BLEND = 0.35
 """How softly bones share the skin between them, in units of their radii."""
@@ -23,20 +25,35 @@ MOST_TWIST_RAD = 2.0
 
 @dataclass(frozen=True, eq=False)
 class SkeletonStart:
-    """Skin blended between bones that move rigidly."""
+    """Skin blended between bones that move rigidly.
+
+    Attributes
+    ----------
+    bones : tuple of Bone
+    owners : SkinOwners
+    lost : frozenset of int
+        Bones that only the first visit shows: they are carried along with the bone that they hang on.
+    """
 
     bones: tuple[Bone, ...]
+    owners: SkinOwners
+    lost: frozenset[int] = frozenset()
 
     def __call__(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rotations (k, 3, 3) and new places (k, 3) of first-visit places (k, 3)."""
-        distance = np.stack([off_bone(places, b) / b.radius_m for b in self.bones])
-        weight = np.exp(-(((distance - distance.min(axis=0)) / BLEND) ** 2))
-        weight /= weight.sum(axis=0)
+        weight = self.shares(places)
         moved = np.zeros_like(places)
         for w, b in zip(weight, self.bones, strict=True):
             moved += w[:, None] * ((places - b.start) @ b.rotation.T + b.moved_start)
         mixed = np.einsum("bk,bij->kij", weight, np.array([b.rotation for b in self.bones]))
         return nearest_rotations(mixed), moved
+
+    def shares(self, places: FloatArray) -> FloatArray:
+        """How much each bone (b, k) moves first-visit places (k, 3); sums to 1 over the bones."""
+        distance = np.stack([off_bone(places, b) / b.radius_m for b in self.bones])
+        distance[~self.owners.may_carry(places).T] = np.inf
+        weight = np.exp(-(((distance - distance.min(axis=0)) / BLEND) ** 2))
+        return np.asarray(weight / weight.sum(axis=0))
 
 
 def off_bone(places: FloatArray, bone: Bone) -> FloatArray:
@@ -58,12 +75,49 @@ def nearest_rotations(matrices: FloatArray) -> FloatArray:
     return np.asarray(turned)
 
 
-def skeleton_start(pair: VisitPair) -> SkeletonStart | None:
-    """The start from the joints of both visits; None without a trunk."""
+def skeleton_start(pair: VisitPair, places: FloatArray, edges: IntArray) -> SkeletonStart | None:
+    """The start from the joints of both visits; None without a trunk.
+
+    Parameters
+    ----------
+    places : ndarray (s, 3)
+        Samples of the first skin.
+    edges : ndarray (e, 2)
+        Samples that are joined along the skin.
+    """
     skeleton = bones(pair)
     if not skeleton:
         return None
-    return SkeletonStart(posed(pair, skeleton))
+    moved = posed(pair, skeleton)
+    lost = _lost_bones(pair, moved)
+    both = moved + lost
+    return SkeletonStart(both, SkinOwners(both, places, edges), frozenset(range(len(moved), len(both))))
+
+
+def _lost_bones(pair: VisitPair, skeleton: tuple[Bone, ...]) -> tuple[Bone, ...]:
+    """Limb segments that the first visit shows and the follow-up does not, moving with their parents.
+
+    Without them their skin would pass for that of the bone nearest to it.
+    """
+    first = pair.first.skeleton
+    number = {bone.name: k for k, bone in enumerate(skeleton)}
+    out: list[Bone] = []
+    for near, middle, far, thick, thin in LIMB_BONES:
+        parent = 0
+        for start, end, radius in ((near, middle, thick), (middle, far, thin)):
+            name = f"{start} to {end}"
+            if name in number:
+                parent = number[name]
+                continue
+            if not first.sees(start, end):
+                break
+            above = (*skeleton, *out)[parent]
+            a, b = first.point(start), first.point(end)
+            carried = above.moved_start + above.rotation @ (a - above.start)
+            tip = b + (HAND_SHARE * (b - a) if end.endswith("hand") else 0.0)
+            out.append(Bone(name, a, tip, radius, above.rotation, carried, parent))
+            parent = len(skeleton) + len(out) - 1
+    return tuple(out)
 
 
 def posed(pair: VisitPair, skeleton: tuple[Bone, ...]) -> tuple[Bone, ...]:
