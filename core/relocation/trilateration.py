@@ -25,8 +25,6 @@ MAX_SQUARED = 200.0
 """Normalised squared residuals are cut here: a farther anchor says no more than "elsewhere"."""
 UNKNOWN = np.float32(1.5 / np.sqrt(FREEDOM))
 """An unknown distance costs as much as one 1.5 sigma off: no reason to go there, none to stay away."""
-_PRODUCT = 16
-"""Logarithms are taken of products of so many terms: single precision holds them."""
 AMBIGUOUS_COST = 2.0
 """Two places whose costs differ by less explain the distances equally well."""
 
@@ -91,11 +89,10 @@ class Fix:
 
 def vertex_areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     """Skin area (n,) of each vertex in square metres: a third of its triangles'."""
-    corner = vertices[triangles]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 6
+    from core.relocation.trilateration_kernels import sum_areas
+
     out = np.zeros(len(vertices))
-    for k in range(3):
-        out += np.bincount(triangles[:, k], weights=area, minlength=len(vertices))
+    sum_areas(np.ascontiguousarray(vertices), np.ascontiguousarray(triangles), out)
     return out
 
 
@@ -107,20 +104,23 @@ def cost_field(
     Anchors with an infinite `lesion` distance take no part; a vertex an anchor does not reach pays the cut of
     `MAX_SQUARED`.
     """
-    use = np.isfinite(lesion)
-    scale = (1.0 / (sigma_m[use] * np.sqrt(FREEDOM))).astype(np.float32)
+    return _costs(distances, lesion, sigma_m)[0]
+
+
+def _costs(
+    distances: NDArray[np.float32], lesion: FloatArray, sigma_m: FloatArray
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """`cost_field`, and which vertices (n,) an anchor of the lesion reaches."""
+    from core.relocation.trilateration_kernels import sum_costs
+
+    rows = np.flatnonzero(np.isfinite(lesion))
+    scales = (1.0 / (sigma_m[rows] * np.sqrt(FREEDOM))).astype(np.float32)
     limit = np.float32(np.sqrt(MAX_SQUARED / FREEDOM))
-    total = np.zeros(distances.shape[1], np.float32)
-    rows = np.flatnonzero(use)
-    targets = lesion[use].astype(np.float32)
-    for start in range(0, len(rows), _PRODUCT):
-        product = np.ones(distances.shape[1], np.float32)
-        for k in range(start, min(start + _PRODUCT, len(rows))):
-            residual = np.abs(distances[rows[k]] - targets[k]) * scale[k]
-            residual = np.where(np.isnan(residual), UNKNOWN, np.minimum(residual, limit))
-            product *= np.float32(1.0) + residual * residual
-        total += np.log(product)
-    return np.asarray(np.float32(4.0) * total, dtype=np.float32)
+    cost = np.empty(distances.shape[1], np.float32)
+    reached = np.empty(distances.shape[1], np.bool_)
+    single = np.ascontiguousarray(distances, dtype=np.float32)
+    sum_costs(single, rows, lesion[rows].astype(np.float32), scales, limit, UNKNOWN, cost, reached)
+    return cost, reached
 
 
 def neighbourhood_cost(vertices: FloatArray, place: FloatArray, sigma_m: float) -> NDArray[np.float32]:
@@ -128,8 +128,11 @@ def neighbourhood_cost(vertices: FloatArray, place: FloatArray, sigma_m: float) 
 
     It decides between places that mirror each other and hardly moves an answer that is near.
     """
-    square = ((vertices - place) ** 2).sum(axis=1) / (FREEDOM * sigma_m**2)
-    return np.asarray(4.0 * np.log1p(square), dtype=np.float32)
+    from core.relocation.trilateration_kernels import place_costs
+
+    cost = np.empty(len(vertices), np.float32)
+    place_costs(np.ascontiguousarray(vertices), np.asarray(place, float), 1.0 / (FREEDOM * sigma_m**2), cost)
+    return cost
 
 
 def trilaterate(
@@ -159,10 +162,9 @@ def trilaterate(
         None when no vertex is reached by any anchor of the lesion.
     """
     use = np.isfinite(lesion)
-    cost = cost_field(field.distances, lesion, sigma_m)
+    cost, reached = _costs(field.distances, lesion, sigma_m)
     if extra_cost is not None:
         cost = cost + extra_cost
-    reached = np.isfinite(field.distances[use]).any(axis=0)
     if not use.any() or not reached.any():
         return None
     cost = np.where(reached, cost, np.float32(np.inf))
