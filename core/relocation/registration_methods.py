@@ -61,6 +61,7 @@ def _outcome(
     with context.clock.phase("judgement"):
         return MethodOutcome(
             judge(pair, transfer, fixes),
+            sight_judged=True,
             new_spots=new_spots(pair, transfer),
             vanished_spots=vanished_spots(pair, transfer),
         )

@@ -42,10 +42,15 @@ class MethodContext:
 
 @dataclass(frozen=True, eq=False)
 class MethodOutcome:
-    """Estimates in the order of the lesions, and what else the method noticed."""
+    """Estimates in the order of the lesions, and what else the method noticed.
+
+    `sight_judged` says that the method itself held every place against the cameras; otherwise the skeleton
+    decides what is turned away.
+    """
 
     estimates: tuple[Estimate, ...]
     warnings: tuple[str, ...] = ()
+    sight_judged: bool = False
     new_spots: tuple[Spot, ...] = ()
     vanished_spots: tuple[Spot, ...] = ()
 

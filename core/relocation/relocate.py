@@ -14,6 +14,7 @@ from core.relocation.clock import PhaseClock
 from core.relocation.compatibility import why_not
 from core.relocation.pair import KnownPlace, PickedLesion, VisitPair
 from core.relocation.registry import DEFAULT_METHOD, MethodContext, MethodOutcome, relocation_method
+from core.relocation.sides import with_sides_settled
 from core.relocation.types import (
     Candidate,
     ConfirmedLesion,
@@ -79,10 +80,12 @@ def relocate(
         for q, p in zip(queries, picks, strict=True)
         if p.point is not None and p.normal is not None
     ]
-    pair = VisitPair(first, followup)
+    pair, remarks = VisitPair(first, followup), tuple[str, ...]()
     outcome, obstacle = MethodOutcome(()), ""
     if placed:
         progress(0.05, "Comparing the captures")
+        with clock.phase("sides"):
+            pair, remarks = with_sides_settled(pair)
         with clock.phase("geodesics"):
             obstacle = why_not(pair)
         if not obstacle:
@@ -96,7 +99,8 @@ def relocate(
             )
             outcome = chosen.estimate(pair, placed, context)
     with clock.phase("visibility"):
-        skeleton = bones(pair) if options.check_visibility and placed and not obstacle else ()
+        by_skeleton = options.check_visibility and not outcome.sight_judged and placed and not obstacle
+        skeleton = bones(pair) if by_skeleton else ()
         estimates = dict(
             zip((p.query.id for p in placed), zip(placed, outcome.estimates, strict=False), strict=False)
         )
@@ -115,6 +119,7 @@ def relocate(
                 *(f"First visit: {w}" for w in first.warnings),
                 *(f"Follow-up: {w}" for w in followup.warnings),
                 *(f"Lesion {q.id}: {w}" for q, p in zip(queries, picks, strict=True) for w in p.warnings),
+                *remarks,
                 *outcome.warnings,
             )
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from core.anchors import Skeleton
 from core.relocation.bones import LIMB_BONES, Bone, bones, minimal_rotation
 from core.relocation.pair import VisitPair
 from core.relocation.registration.patches import SkinOwners
@@ -134,11 +135,12 @@ def posed(pair: VisitPair, skeleton: tuple[Bone, ...]) -> tuple[Bone, ...]:
         goal = _goal(pair, bone)
         rotation = minimal_rotation(trunk.rotation @ length, goal - origin) @ trunk.rotation
         child = next((k for k, b in enumerate(out) if b.parent == number), None)
-        if child is None:
-            out[number] = replace(bone, rotation=rotation, moved_start=origin)
-            continue
-        rotation = _twisted(pair, rotation, bone, out[child])
+        limb = next((names for names in LIMB_BONES if bone.name == f"{names[0]} to {names[1]}"), None)
+        if limb is not None:
+            rotation = _twisted(pair, rotation, limb[:3])
         out[number] = replace(bone, rotation=rotation, moved_start=origin)
+        if child is None:
+            continue
         far = out[child]
         knot = origin + rotation @ length
         along = far.end - far.start
@@ -153,17 +155,14 @@ def _goal(pair: VisitPair, bone: Bone) -> FloatArray:
     return pair.joints_m(bone.name.split(" to ")[1])[1]
 
 
-def _twisted(pair: VisitPair, rotation: FloatArray, near: Bone, far: Bone) -> FloatArray:
+def _twisted(pair: VisitPair, rotation: FloatArray, names: tuple[str, str, str]) -> FloatArray:
     """The upper limb's rotation, turned about its axis into the plane in which elbow or knee bends.
 
     A straight limb has no such plane. A straight knee then tells nothing; of a straight elbow anatomy says
-    where it would bend: to the front, and in a raised or stretched-out arm inward.
+    where it would bend: to the front, and in a raised or stretched-out arm inward. So it does of an elbow
+    whose hand is out of sight.
     """
-    names = (near.name.split(" to ")[0], *far.name.split(" to "))
-    one, two = (
-        _bending([pair.joints_m(name)[visit] for name in names], _natural_bend(pair, visit, names))
-        for visit in (0, 1)
-    )
+    one, two = (_bending(pair, visit, names) for visit in (0, 1))
     if one is None or two is None:
         return rotation
     (direction1, trust1), (direction2, trust2) = one, two
@@ -175,12 +174,16 @@ def _twisted(pair: VisitPair, rotation: FloatArray, near: Bone, far: Bone) -> Fl
     return about(axis, float(np.clip(angle, -most, most))) @ rotation
 
 
-def _bending(joints: list[FloatArray], natural: FloatArray | None) -> tuple[FloatArray, float] | None:
+def _bending(pair: VisitPair, visit: int, names: tuple[str, str, str]) -> tuple[FloatArray, float] | None:
     """Direction (3,) into which a limb of three joints bends, across its upper half, and its trust 0..1."""
-    start, middle, tip = joints
+    skeleton = (pair.first if visit == 0 else pair.followup).skeleton
+    natural = _natural_bend(skeleton, names)
+    start, middle = (skeleton.point(name) for name in names[:2])
     axis = (middle - start) / np.linalg.norm(middle - start)
-    lower = (tip - middle) / np.linalg.norm(tip - middle)
-    across = _across(lower, axis)
+    across = np.zeros(3)
+    if skeleton.sees(names[2]):
+        lower = skeleton.point(names[2]) - middle
+        across = _across(lower / np.linalg.norm(lower), axis)
     size = float(np.linalg.norm(across))
     trust = float(np.clip((size - BENT_FROM) / (BENT_FULLY - BENT_FROM), 0.0, 1.0))
     if natural is None:
@@ -197,10 +200,9 @@ def _across(direction: FloatArray, axis: FloatArray) -> FloatArray:
     return np.asarray(direction - axis * (direction @ axis))
 
 
-def _natural_bend(pair: VisitPair, visit: int, names: tuple[str, ...]) -> FloatArray | None:
+def _natural_bend(skeleton: Skeleton, names: tuple[str, str, str]) -> FloatArray | None:
     """Direction (3,) into which a straight elbow would bend; None for knees and without a trunk."""
     needed = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
-    skeleton = (pair.first if visit == 0 else pair.followup).skeleton
     if not names[1].endswith("elbow") or not skeleton.sees(*needed):
         return None
     up = skeleton.point("neck") - 0.5 * (skeleton.point("left_hip") + skeleton.point("right_hip"))
