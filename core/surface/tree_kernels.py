@@ -66,7 +66,9 @@ def build_tree(
 
 @njit(cache=True, nogil=True)
 def _enter(box: NDArray[np.float64], o: NDArray[np.float64], inverse: NDArray[np.float64]) -> float:
-    """Ray parameter at which a box is entered, infinite if it is missed."""
+    """Ray parameter at which a box is entered, infinite if it is missed or empty."""
+    if box[0] > box[3]:  # nothing in it: from infinity to minus infinity, which every ray would cross
+        return np.inf
     near, far = 0.0, np.inf
     for q in range(3):
         a, b = (box[q] - o[q]) * inverse[q], (box[3 + q] - o[q]) * inverse[q]
