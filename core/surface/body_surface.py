@@ -14,6 +14,7 @@ from core.capture.camera import PinholeCamera
 from core.errors import WorkError
 from core.surface.points import SurfacePoint
 from core.surface.raycast import GridTree, RayHits
+from core.surface.threads import in_chunks
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -23,6 +24,8 @@ IntArray = NDArray[np.int32]
 
 DEFAULT_JUMP_M = 0.03
 _SMALLEST_PART = 60
+_LEAST_DEPTH_M = 0.05
+_CHUNK = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +146,16 @@ class BodySurface:
 
     def nearest(self, points: ArrayLike) -> list[SurfacePoint]:
         """The surface point nearest to each of ``points`` (k, 3)."""
+        found = zip(*self.nearest_arrays(points), strict=True)
+        return [SurfacePoint(int(triangle), weights, place) for triangle, weights, place in found]
+
+    def nearest_arrays(self, points: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Triangles (k,), corner weights (k, 3) and places (k, 3) of the points nearest to (k, 3) others.
+
+        As `nearest`, for many points.
+        """
         triangles, weights = self.tree.nearest(points)
-        return [self.point(int(t), w) for t, w in zip(triangles, weights, strict=True)]
+        return triangles, weights, np.einsum("ki,kij->kj", weights, self.vertices[self.triangles[triangles]])
 
     def nearest_vertex(self, points: ArrayLike) -> NDArray[np.int64]:
         """Index (k,) of the vertex nearest to each of ``points`` (k, 3)."""
@@ -153,9 +164,22 @@ class BodySurface:
 
     def vertices_within(self, points: ArrayLike, reach_m: float) -> NDArray[np.int64]:
         """Index (k,) of the vertex nearest to each of ``points`` (k, 3); -1 where none is within reach."""
-        p = np.asarray(points, dtype=float).reshape(-1, 3)
-        distance, index = self._vertex_tree.query(p, distance_upper_bound=reach_m)
-        return np.where(np.isfinite(distance), index, -1).astype(np.int64)
+        p = np.ascontiguousarray(np.asarray(points, dtype=float).reshape(-1, 3))
+        before = np.isfinite(p).all() and (p[:, 2] > _LEAST_DEPTH_M).all()
+        if any(self.camera.distortion) or not before:
+            distance, index = self._vertex_tree.query(p, distance_upper_bound=reach_m)
+            return np.where(np.isfinite(distance), index, -1).astype(np.int64)
+        from core.surface.grid_kernels import vertices_near
+
+        out, c = np.empty(len(p), np.int64), self.camera
+        lens = c.fx, c.fy, c.cx, c.cy
+
+        def work(first: int, last: int) -> None:
+            k = slice(first, last)
+            vertices_near(p[k], self.vertices, self.vertex_of_pixel, *lens, reach_m, out[k])
+
+        in_chunks(work, len(p), _CHUNK)
+        return out
 
     def point(self, triangle: int, barycentric: ArrayLike) -> SurfacePoint:
         """The surface point of a triangle with the given corner weights (3,)."""

@@ -29,4 +29,5 @@ def warm_up() -> None:
     pick_skin(scan, (80.0, 60.0))
     scan.surface.nearest(scan.surface.vertices[:1])
     scan.surface.nearest_vertex(scan.surface.vertices[:1])
+    scan.surface.vertices_within(scan.surface.vertices[:1], 0.01)
     register_color_to_depth(color, scan.fused.depth_m, capture.rig)

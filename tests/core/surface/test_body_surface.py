@@ -141,3 +141,32 @@ def test_nearest_vertices_are_found() -> None:
     np.testing.assert_array_equal(surface.nearest_vertex(surface.vertices[picked] + 1e-6), picked)
     assert isinstance(surface.vertex_point(17), SurfacePoint)
     np.testing.assert_allclose(surface.vertex_point(17).position_m, surface.vertices[17], atol=1e-12)
+
+
+@pytest.mark.parametrize("lens", [(), (0.02, -0.01, 0.001, 0.0)])
+def test_vertices_within_reach_are_the_nearest_of_all(lens: tuple[float, ...]) -> None:
+    camera = PinholeCamera(120, 90, 110.0, 110.0, 59.5, 44.5, lens)
+    surface = BodySurface.from_depth(ball(), camera)
+    rng = np.random.default_rng(2)
+    near = surface.vertices[rng.integers(0, len(surface.vertices), 400)] + rng.normal(0, 0.04, (400, 3))
+    aside = rng.uniform((-2.0, -2.0, 0.2), (2.0, 2.0, 4.2), (40, 3))
+    points = np.concatenate([near, aside])
+    away = np.linalg.norm(points[:, None] - surface.vertices[None], axis=2)
+    for reach in (0.01, 0.05, 0.6):
+        expected = np.where(away.min(axis=1) < reach, away.argmin(axis=1), -1)
+        np.testing.assert_array_equal(surface.vertices_within(points, reach), expected)
+    behind = surface.vertices_within([[0.0, 0.0, -0.5], [0.0, 0.0, 0.9]], 0.05)
+    assert behind[0] == -1
+    assert behind[1] >= 0
+
+
+def test_nearest_points_come_one_by_one_or_as_arrays() -> None:
+    surface = BodySurface.from_depth(ball(), CAMERA)
+    queries = np.array([0, 0, 1.0]) + np.random.default_rng(3).normal(0, 0.3, (50, 3))
+    triangles, weights, places = surface.nearest_arrays(queries)
+    points = surface.nearest(queries)
+    np.testing.assert_array_equal(triangles, [p.triangle for p in points])
+    np.testing.assert_array_equal(weights, [p.barycentric for p in points])
+    np.testing.assert_allclose(places, surface.positions(points), atol=1e-12)
+    assert len(surface.nearest_arrays(np.zeros((0, 3)))[2]) == 0
+    assert surface.nearest(np.zeros((0, 3))) == []
