@@ -61,7 +61,11 @@ def vanished_spots(pair: VisitPair, transfer: Transfer) -> tuple[Spot, ...]:
         and spots.confidence[moles.spot[r]] >= LEAST_CONFIDENCE
     ]
     sight = look_at(
-        transfer.carried[rows], transfer.normals[rows], pair.followup.scan.surface, pair.followup.capture.rig
+        transfer.carried[rows],
+        transfer.normals[rows],
+        pair.followup.scan.surface,
+        pair.followup.capture.rig,
+        other_stance=transfer.other_stance,
     )
     out = []
     for number, row in enumerate(rows):

@@ -1,7 +1,10 @@
 """Whether the follow-up's cameras can see a place, by an explicit test.
 
 The carried place is held against the measured depth, the turn of its skin and the frame of both images; the
-fit of the registration says nothing about it (METHOD section 4).
+fit of the registration says nothing about it (METHOD section 4). Skin that has turned away is not carried
+quite behind the body: the registration lays it onto the rim. How far it hangs off the skin there and how
+differently it is turned tell it from skin that is seen; their weights were learned on the calibration
+patients.
 """
 
 from __future__ import annotations
@@ -17,12 +20,15 @@ from core.surface import BodySurface
 FloatArray = NDArray[np.float64]
 
 FRAME_MARGIN_PX = 2.0
-TURNED_COSINE = -0.10
-"""Of the angle between carried skin and the camera: below, the skin has turned away."""
+WEIGHTS = (-1.66, -6.59, 1.99, 2.32, 0.56)
+"""Of 1, the cosine of the carried skin to the camera, its distance to seen skin in centimetres, the cosine of
+that skin, and another stance: a logistic model of being hidden."""
+HIDDEN_LOGIT = -1.2
+"""From here on a place counts as hidden: 84 % of hidden and 2.5 % of visible calibration places."""
+TURNED_COSINE = 0.10
+"""Below, the reason told is that the skin has turned away."""
 COVERED_M = 0.025
 """Something lies this far before the place."""
-OFF_SKIN_M = 0.018
-"""The place is this far from all skin that was seen."""
 
 OUTSIDE = "The place lies outside the picture."
 TURNED = "The skin there is turned away from the camera."
@@ -49,7 +55,9 @@ class Sight:
     off_m: FloatArray
 
 
-def look_at(places: FloatArray, normals: FloatArray, surface: BodySurface, rig: CameraRig) -> Sight:
+def look_at(
+    places: FloatArray, normals: FloatArray, surface: BodySurface, rig: CameraRig, *, other_stance: bool
+) -> Sight:
     """Judge carried places (k, 3) with their normals (k, 3) in the depth-camera frame of the follow-up."""
     if len(places) == 0:
         return Sight((), np.zeros(0), np.zeros(0))
@@ -68,16 +76,33 @@ def look_at(places: FloatArray, normals: FloatArray, surface: BodySurface, rig: 
         cosine = np.minimum(cosine, np.einsum("ki,ki->k", normals, way) / length)
         hits = surface.raycast(eye, -way / length[:, None])
         covered |= hits.hit & (hits.t < length - COVERED_M)
+    gone = _logit(cosine, off, surface, nearest, other_stance) > HIDDEN_LOGIT
     hidden = tuple(
         OUTSIDE
         if not inside[k]
-        else TURNED
-        if cosine[k] < TURNED_COSINE
         else COVERED
         if covered[k]
-        else BEYOND
-        if off[k] > OFF_SKIN_M
         else ""
+        if not gone[k]
+        else TURNED
+        if cosine[k] < TURNED_COSINE
+        else BEYOND
         for k in range(len(places))
     )
     return Sight(hidden, cosine, off)
+
+
+def _logit(
+    cosine: FloatArray, off_m: FloatArray, surface: BodySurface, nearest: FloatArray, other_stance: bool
+) -> FloatArray:
+    """Logit (k,) of a place's being hidden."""
+    normal = surface.normals[surface.nearest_vertex(nearest)]
+    facing = -np.einsum("ki,ki->k", normal, nearest) / np.linalg.norm(nearest, axis=1)
+    one, carried, off, seen, stance = WEIGHTS
+    return np.asarray(
+        one
+        + carried * np.clip(cosine, -0.3, 0.8)
+        + off * 100.0 * np.minimum(off_m, 0.04)
+        + seen * np.clip(facing, 0.0, 1.0)
+        + stance * float(other_stance)
+    )
