@@ -1,4 +1,4 @@
-"""Skin that can be computed: a sheet, flat or rolled without stretching."""
+"""Skin that can be computed: a sheet, flat or rolled without stretching; and one simulated patient twice."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+
+from core.anchors import AnalysedCapture, analyse_capture
+from core.relocation import LesionQuery
+from devices.simulator import CaptureTruth, SimulatedPatient, VisitChange, make_rig
 
 STEP = 0.01
 
@@ -60,3 +64,63 @@ def rolled_sheet() -> Sheet:
 @pytest.fixture(scope="session")
 def anchors() -> np.ndarray:
     return np.array([[0.05, 0.05], [0.55, 0.10], [0.10, 0.70], [0.50, 0.75], [0.30, 0.35], [0.05, 0.40]])
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedVisits:
+    """Three captures of one patient with recorded joints, and what they show.
+
+    The patient lost moles, got new ones, and some lesions healed between the visits.
+    """
+
+    first: AnalysedCapture
+    same: AnalysedCapture
+    other: AnalysedCapture
+    first_truth: CaptureTruth
+    truths: dict[str, CaptureTruth]
+    queries: tuple[LesionQuery, ...]
+
+    def followup(self, stance: str) -> tuple[AnalysedCapture, CaptureTruth]:
+        """Second visit in the same stance ("psi") or in another ("A")."""
+        return (self.same if stance == "psi" else self.other), self.truths[stance]
+
+
+class NoTracker:
+    """Recorded joints need no tracker; asking one is an error."""
+
+    name = "none"
+
+    def detect(self, rgb: np.ndarray) -> None:
+        raise AssertionError("the recorded joints were not used")
+
+    def close(self) -> None:
+        pass
+
+
+HEALED = ("L13", "L15", "L22")
+
+
+@pytest.fixture(scope="session")
+def simulated_visits() -> SimulatedVisits:
+    patient = SimulatedPatient(
+        "m_young_avg",
+        5,
+        120,
+        lesions=40,
+        freckles=60,
+        rig=make_rig((1280, 960)),
+        changes={2: VisitChange(new_moles=16, vanished=16, healed=HEALED)},
+    )
+    taken = [
+        patient.capture(stance, "front", visit, frames=4, seed=seed, joints=True)
+        for stance, visit, seed in (("psi", 1, 1), ("psi", 2, 2), ("A", 2, 2))
+    ]
+    first, same, other = (analyse_capture(t.capture, NoTracker()) for t in taken)
+    truth = taken[0].truth
+    queries = tuple(
+        LesionQuery(name, tuple(truth.mole_pixels[truth.mole_row[name]]), healed=name in HEALED)
+        for name in truth.lesion_ids
+        if truth.mole_visible[truth.mole_row[name]]
+    )
+    truths = {"psi": taken[1].truth, "A": taken[2].truth}
+    return SimulatedVisits(first, same, other, truth, truths, queries)
