@@ -194,9 +194,7 @@ def test_skin_bends_smoothly_over_a_joint(started):
 
 def test_without_a_trunk_there_is_no_start(capture):
     arms = {n: p for n, p in STANDING.items() if "elbow" in n or "hand" in n}
-    pair = VisitPair(
-        replace(capture, skeleton=skeleton(arms)), replace(capture, skeleton=skeleton(STANDING))
-    )
+    pair = VisitPair(replace(capture, skeleton=skeleton(arms)), replace(capture, skeleton=skeleton(STANDING)))
     assert skeleton_start(pair, *bone_skin(STANDING)) is None
 
 
