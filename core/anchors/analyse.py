@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 
 from core.anchors.calibration import SkeletonCalibration
 from core.anchors.finding import find_skeleton
 from core.anchors.skeleton import Skeleton, SkeletonTracker
 from core.anchors.skin_anchors import AnchorSet, project_to_skin
 from core.capture.rgbd import RgbdCapture
-from core.lesions import SkinSpots, detect_spots
+from core.lesions import SkinSpots, spots_of
 from core.progress import Progress, ScaledProgress, no_progress
 from core.surface import BodyScan, scan_body
 
@@ -36,10 +36,10 @@ class AnalysedCapture:
     anchors: AnchorSet
     warnings: tuple[str, ...]
 
-    @cached_property
+    @property
     def spots(self) -> SkinSpots:
-        """The mole-like spots of the picture, found on first use."""
-        return detect_spots(self.scan)
+        """The mole-like spots of the picture, found once for each scan."""
+        return spots_of(self.scan)
 
 
 def analyse_capture(
@@ -48,9 +48,19 @@ def analyse_capture(
     *,
     use_recorded: bool = True,
     calibration: SkeletonCalibration | None = None,
+    find_spots: bool = True,
     progress: Progress = no_progress,
 ) -> AnalysedCapture:
     """Scan the body, find its joints, move them to the skin.
+
+    Parameters
+    ----------
+    capture : RgbdCapture
+    tracker : SkeletonTracker
+    use_recorded, calibration
+        See `find_skeleton`.
+    find_spots : bool
+        Find the spots on the other core while the joints are found. False leaves them to their first use.
 
     Raises
     ------
@@ -61,7 +71,12 @@ def analyse_capture(
     """
     scan = scan_body(capture, progress=ScaledProgress(progress, 0.0, 0.6))
     progress(0.6, "Finding the joints")
-    skeleton = find_skeleton(scan, tracker, use_recorded=use_recorded, calibration=calibration)
+    with ThreadPoolExecutor(1, "spots") as beside:
+        spots = beside.submit(spots_of, scan) if find_spots else None
+        skeleton = find_skeleton(scan, tracker, use_recorded=use_recorded, calibration=calibration)
+        progress(0.85, "Finding the moles")
+        if spots is not None:
+            spots.result()
     return with_skeleton(scan, skeleton, progress=ScaledProgress(progress, 0.9, 1.0))
 
 

@@ -2,6 +2,7 @@
 
 from core.lesions.appearance import appearance_distance
 from core.lesions.clicks import spot_at
+from core.lesions.known_spots import spots_of
 from core.lesions.spots import SkinSpots, detect_spots
 
-__all__ = ["SkinSpots", "appearance_distance", "detect_spots", "spot_at"]
+__all__ = ["SkinSpots", "appearance_distance", "detect_spots", "spot_at", "spots_of"]
