@@ -12,11 +12,13 @@ def warm_up() -> float:
     second or two later on, when they are loaded. For set-up or a background thread, never for a click.
     """
     from core.geodesics import warm_up as warm_up_geodesics
+    from core.relocation.warm_up import warm_up as warm_up_relocation
     from core.surface import warm_up as warm_up_surface
 
     started = time.perf_counter()
     warm_up_surface()
     warm_up_geodesics()
+    warm_up_relocation()
     return time.perf_counter() - started
 
 
