@@ -69,14 +69,14 @@ def shade_depths(
         return [plain for _ in lamps]
     filled = _fill(np.where(seen, depth_m, 0.0), seen)
     smooth = cv2.bilateralFilter(cv2.medianBlur(filled, 5), 7, 0.03, 3.0).astype(np.float64)
-    normals = _normals(camera.pixel_rays * smooth[..., None])
+    normals = _normals(camera.pixel_rays * smooth[..., None], seen)
     near, far = np.percentile(depth_m[seen], [2.0, 98.0])
-    haze = 1.0 - 0.25 * np.clip((smooth - near) / max(far - near, 0.2), 0.0, 1.0)
+    haze = 1.0 - 0.25 * np.clip((smooth[seen] - near) / max(far - near, 0.2), 0.0, 1.0)
     images = []
     for lamp in lamps:
         towards = np.asarray(lamp) / np.linalg.norm(lamp)
-        light = np.clip(normals[seen] @ towards, 0.0, 1.0)
-        brightness = (_AMBIENT + (1.0 - _AMBIENT) * light) * haze[seen]
+        light = np.clip(normals @ towards, 0.0, 1.0)
+        brightness = (_AMBIENT + (1.0 - _AMBIENT) * light) * haze
         image = plain.copy()
         image[seen] = np.clip(brightness[:, None] * _SKIN, 0, 255).astype(np.uint8)
         images.append(image)
@@ -93,10 +93,10 @@ def _fill(depth: FloatArray, seen: NDArray[np.bool_]) -> NDArray[np.float32]:
     return np.asarray(of_label[label], dtype=np.float32)
 
 
-def _normals(points: FloatArray) -> FloatArray:
-    """Unit normals (h, w, 3) towards the camera of an image of points."""
-    across = cv2.Sobel(points, cv2.CV_64F, 1, 0, ksize=3)
-    down = cv2.Sobel(points, cv2.CV_64F, 0, 1, ksize=3)
+def _normals(points: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+    """Unit normals (n, 3) towards the camera at the n seen pixels of an image of points."""
+    across = cv2.Sobel(points, cv2.CV_64F, 1, 0, ksize=3)[seen]
+    down = cv2.Sobel(points, cv2.CV_64F, 0, 1, ksize=3)[seen]
     normals = np.cross(down, across)
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.asarray(normals / np.maximum(length, 1e-12))

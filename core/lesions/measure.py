@@ -164,8 +164,9 @@ def _directions() -> FloatArray:
 def _grid(places: FloatArray, radius: FloatArray, axes: FloatArray, rings: FloatArray) -> Image:
     """Crop pixels (n, angles, rings, 2) of the samples."""
     toward = (_directions() @ (axes * radius[:, None, None])).astype(np.float32)
-    middle = places.astype(np.float32)[:, None, None, :]
-    return middle + toward[:, :, None, :] * rings.astype(np.float32)[:, None]
+    grid = toward[:, :, None, :] * rings.astype(np.float32)[:, None]
+    grid += places.astype(np.float32)[:, None, None, :]
+    return np.asarray(grid)
 
 
 def _remap(image: NDArray[np.generic], grid: Image) -> NDArray[np.generic]:

@@ -46,14 +46,15 @@ def measure_skin_tone(capture: RgbdCapture, body_pixels: FloatArray) -> SkinTone
     loose = (lab[:, 0] > 15) & (hue > 10) & (hue < 80) & (chroma > 8) & (chroma < 55)
     if loose.mean() < _LEAST_SKIN_SHARE or loose.sum() < 200:
         return None
-    skin = lab[loose]
+    skin = np.ascontiguousarray(lab[loose].T)  # medians of rows are found faster than those of columns
     for _ in range(3):
-        center = np.median(skin, axis=0)
-        spread = np.maximum(1.4826 * np.median(np.abs(skin - center), axis=0), (4.0, 2.0, 2.0))
-        inlier = (np.abs(skin - center) < 3.0 * spread).all(axis=1)
+        center = np.median(skin, axis=1)
+        away = np.abs(skin - center[:, None])
+        spread = np.maximum(1.4826 * np.median(away, axis=1), (4.0, 2.0, 2.0))
+        inlier = (away < 3.0 * spread[:, None]).all(axis=0)
         if inlier.sum() < 100:
             break
-        skin = skin[inlier]
+        skin = skin[:, inlier]
     return SkinTone(center, spread)
 
 
