@@ -97,7 +97,8 @@ class NoTracker:
         pass
 
 
-HEALED = ("L13", "L15", "L22")
+HEALED = ("L16", "L20", "L27")
+"""Lesions on the front of the patient."""
 
 
 @pytest.fixture(scope="session")

@@ -98,7 +98,7 @@ def test_looks_decide_between_two_spots_that_lie_alike():
 
 def test_certain_matches_are_kept_and_free_their_spots():
     places = scattered(np.random.default_rng(3), 10, 0.3, 0.05)
-    spots = places + [0.001, 0.0, 0.0]
+    spots = places + np.array([0.001, 0.0, 0.0])
     found = match_spots(side_of(places), spots, np.zeros((10, 10)), known={0: 5})
     assert found.partner[0] == 5
     assert found.sure[0]

@@ -84,7 +84,7 @@ def errors(result, truth):
 @pytest.mark.parametrize(("second", "worst_mm"), [("psi", 22), ("A", 35)])
 def test_trilateration_finds_lesions_in_the_same_and_in_another_stance(patients, second, worst_mm):
     one, two, queries, truth = patients.pair("psi", second)
-    result = relocate(one, two, queries)
+    result = relocate(one, two, queries, method="trilateration")
     assert result.method == "trilateration"
     assert [lesion.id for lesion in result.lesions] == [q.id for q in queries]
     found = errors(result, truth)
@@ -104,18 +104,30 @@ def test_trilateration_finds_lesions_in_the_same_and_in_another_stance(patients,
             assert lesion.reason
 
 
+@pytest.mark.parametrize(("second", "worst_mm"), [("psi", 10), ("A", 14)])
+def test_the_default_finds_them_nearer_by_shape_alone(patients, second, worst_mm):
+    one, two, queries, truth = patients.pair("psi", second)
+    result = relocate(one, two, queries, appearance=False)
+    assert result.method == "fused"
+    found = errors(result, truth)
+    seen = sum(bool(truth.mole_visible[truth.mole_row[q.id]]) for q in queries)
+    assert len(found) >= 0.85 * seen
+    assert 1000 * found.mean() < worst_mm
+    assert found.mean() < errors(relocate(one, two, queries, method="trilateration"), truth).mean()
+
+
 @pytest.mark.parametrize("method", ["voting-dijkstra", "voting-fmm"])
 def test_voting_comes_near_but_trilateration_comes_nearer(patients, method):
     one, two, queries, truth = patients.pair("psi", "psi")
     voted = errors(relocate(one, two, queries, method=method), truth)
-    placed = errors(relocate(one, two, queries), truth)
+    placed = errors(relocate(one, two, queries, method="trilateration"), truth)
     assert np.median(voted) < 0.07
     assert placed.mean() < voted.mean()
 
 
 def test_the_same_call_gives_the_same_answer(patients):
     one, two, queries, _ = patients.pair("psi", "A")
-    a, b = (relocate(one, two, queries[:6], seed=3) for _ in range(2))
+    a, b = (relocate(one, two, queries[:6], method="trilateration", seed=3) for _ in range(2))
     for x, y in zip(a.lesions, b.lesions, strict=True):
         assert (x.status, x.confidence) == (y.status, y.confidence)
         assert x.point_m == pytest.approx(y.point_m) if x.has_point else not y.has_point
@@ -123,9 +135,13 @@ def test_the_same_call_gives_the_same_answer(patients):
 
 def test_every_phase_is_timed(patients):
     one, two, queries, _ = patients.pair("psi", "psi")
-    seconds = relocate(one, two, queries[:2]).seconds
-    assert {"lesions", "geodesics", "anchors", "trilateration", "visibility", "total"} <= set(seconds)
-    assert seconds["total"] >= max(v for k, v in seconds.items() if k != "total")
+    for method, own in (
+        ("trilateration", {"anchors", "trilateration"}),
+        ("fused", {"registration", "spots", "matching", "trilateration", "judgement"}),
+    ):
+        seconds = relocate(one, two, queries[:2], method=method).seconds
+        assert {"lesions", "geodesics", "visibility", "total"} | own <= set(seconds)
+        assert seconds["total"] >= max(v for k, v in seconds.items() if k != "total")
 
 
 def test_a_click_beside_the_body_is_refused_and_the_rest_is_answered(patients):

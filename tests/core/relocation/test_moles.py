@@ -105,7 +105,7 @@ def test_skin_of_two_limbs_counts_as_farther_apart(simulated_visits, start):
         for p in (
             0.5 * (joints.point("left_elbow") + joints.point("left_hand")),
             joints.point("torso") - [0.0, 0.05, 0.1],
-            joints.point("torso") + [0.0, 0.05, -0.1],
+            joints.point("torso") + np.array([0.0, 0.05, -0.1]),
         )
     )
     from core.relocation.moles import limb_coordinates

@@ -81,7 +81,7 @@ def test_skin_laid_onto_the_rim_is_judged_by_how_it_hangs_there(surface):
     rim = np.array([0.138, -0.15, 1.58])
     outward = np.array([1.0, 0.0, 0.0])
     assert look(surface, rim, outward)[0] != ""
-    assert look(surface, rim + [0.02, 0.0, 0.0], outward)[0] != ""
+    assert look(surface, rim + np.array([0.02, 0.0, 0.0]), outward)[0] != ""
     places = rim + np.linspace(-0.03, 0.03, 13)[:, None] * outward
     here, there = (
         look_at(places, np.tile(TOWARD, (13, 1)), surface, DEPTH_ONLY, other_stance=stance).hidden

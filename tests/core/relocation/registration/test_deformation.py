@@ -84,7 +84,7 @@ def test_a_rigid_motion_that_the_skeleton_knows_is_kept(figure, moved_figure):
 
 
 def test_a_rigid_motion_is_found_where_the_skeleton_is_wrong_by_centimetres(figure, moved_figure):
-    wrong = moved_bone("trunk", TRUNK, turn([0, 0, 1], 4.0) @ TURN, SHIFT + [0.02, 0.015, -0.03])
+    wrong = moved_bone("trunk", TRUNK, turn([0, 0, 1], 4.0) @ TURN, SHIFT + np.array([0.02, 0.015, -0.03]))
     places = seen_skin(figure)
     truth = places @ TURN.T + SHIFT
     start = np.linalg.norm(start_on(figure, (wrong,))(places)[1] - truth, axis=1)
@@ -151,7 +151,7 @@ def test_a_forearm_swings_about_its_elbow_and_the_upper_arm_stays():
     bones = (
         still_bone("trunk", body),
         still_bone("upper", upper, 0),
-        Bone("fore", elbow, hand, 0.05, doubted, elbow + [0.01, -0.01, 0.0], 1),
+        Bone("fore", elbow, hand, 0.05, doubted, elbow + np.array([0.01, -0.01, 0.0]), 1),
     )
     deformation, _ = register(first, second, bones)
     on_fore = first.vertices[near_to(first, fore)]
@@ -196,7 +196,7 @@ def test_only_the_first_stage_rests_on_the_skeleton(figure, moved_figure):
 
 
 def test_the_same_registration_twice_is_the_same(figure, moved_figure):
-    bones = (moved_bone("trunk", TRUNK, TURN, SHIFT + [0.01, 0.0, 0.0]),)
+    bones = (moved_bone("trunk", TRUNK, TURN, SHIFT + np.array([0.01, 0.0, 0.0])),)
     places = seen_skin(figure)[::17]
     one, two = (register(figure, moved_figure, bones)[0].warp(places)[0] for _ in range(2))
     assert (one == two).all()

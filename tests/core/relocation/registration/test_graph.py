@@ -94,8 +94,8 @@ def test_an_arm_beside_the_trunk_does_not_hang_on_the_trunk(beside):
 
 
 def test_skin_that_touches_is_told_apart_by_the_skeleton(leaning):
-    upper = still_bone("upper", Capsule(LEANING.start, LEANING.start + [0.0, 0.02, 0.0], 0.05), 0)
-    fore = still_bone("fore", Capsule(LEANING.start + [0.0, 0.02, 0.0], LEANING.end, 0.05), 1)
+    upper = still_bone("upper", Capsule(LEANING.start, LEANING.start + np.array([0.0, 0.02, 0.0]), 0.05), 0)
+    fore = still_bone("fore", Capsule(LEANING.start + np.array([0.0, 0.02, 0.0]), LEANING.end, 0.05), 1)
     trunk = still_bone("trunk", TRUNK)
     blind = graph_on(leaning, ALONE, spacing_m=SPACING)
     knowing = graph_on(leaning, (trunk, upper, fore), spacing_m=SPACING)

@@ -46,7 +46,7 @@ def test_fingers_beside_the_thigh_belong_to_the_forearm():
 def test_any_place_belongs_to_the_sample_beside_it():
     places, edges, (arm, _) = arm_and_leg()
     made = SkinOwners(BONES, places, edges)
-    tips = places[arm][-3:] + [0.002, 0.001, -0.001]
+    tips = places[arm][-3:] + np.array([0.002, 0.001, -0.001])
     assert (made.at(tips) == HAND).all()
     carriers = made.may_carry(tips)
     assert carriers[:, [HAND, ARM]].all()

@@ -186,7 +186,7 @@ def test_a_straight_knee_tells_nothing_and_a_bent_one_tells_the_turn(started):
 
 def test_skin_bends_smoothly_over_a_joint(started):
     start = started(STANDING, posed(left_hand=[0.22, -0.12, 1.73]))
-    line = np.linspace(STANDING["left_shoulder"], STANDING["left_hand"], 200) + [0.0, 0.0, -0.04]
+    line = np.linspace(STANDING["left_shoulder"], STANDING["left_hand"], 200) + np.array([0.0, 0.0, -0.04])
     _, moved = start(line)
     steps = np.linalg.norm(np.diff(moved, axis=0), axis=1)
     assert steps.max() < 6 * np.linalg.norm(line[1] - line[0])
