@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import typer
 
 from core.errors import InputError
@@ -237,6 +236,8 @@ def _held_capture(
     patient: SimulatedPatient, stance: str, number: int, place: tuple[float, float]
 ) -> tuple[RgbdCapture, Clicks]:
     """One capture of the held stance, and the clicks on its lesions."""
+    import numpy as np
+
     from core.evaluation.thesis import Clicks
 
     rng = np.random.default_rng((patient.seed, number, *stance.encode()))
@@ -262,6 +263,8 @@ def _held_capture(
 
 def simulated_wall(seed: int, distance_m: float = 1.6, yaw_deg: float = 12.0) -> RgbdCapture:
     """One raw depth frame of a bare wall as the simulated Kinect sees it; there is no colour."""
+    import numpy as np
+
     from core.capture import CameraRig, RgbdCapture
     from devices.simulator.sensor import DEPTH_UNIT_M, DepthSensor, FrameMaker, SensorView
 

@@ -64,6 +64,10 @@ HEAVY = (
     "sqlalchemy",
     "pydicom",
     "reportlab",
+    "dask",
+    "distributed",
+    "matplotlib",
+    "threadpoolctl",
 )
 
 
@@ -74,3 +78,13 @@ def test_importing_it_costs_no_heavy_library(module: str) -> None:
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert printed.stdout.strip() == "[]"
+
+
+def test_the_help_costs_no_library_but_typer() -> None:
+    code = (
+        "import sys; from app.cli.main import main; main(['--help']); "
+        f"sys.stderr.write(str([m for m in {(*HEAVY, 'numpy', 'cv2')!r} if m in sys.modules]))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "relocate-batch" in ran.stdout
+    assert ran.stderr == "[]"
