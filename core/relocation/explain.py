@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors import AnalysedCapture
-from core.errors import InputError
+from core.errors import InputError, WorkError
 from core.geodesics import GeodesicFields, trace_path
 from core.relocation.field_store import FIELDS, GeodesicKind
 from core.relocation.pair import PickedLesion, VisitPair, anchor_points
@@ -58,6 +58,8 @@ class LesionExplanation:
         The lesion in the first visit.
     first_paths, paths : mapping of str to ndarray (k, 3)
         Shortest way along the skin from the lesion, and from the answer, to every connected anchor.
+    first_untraced, untraced : tuple of str
+        Anchors that are connected, but to which no way could be followed through the distances.
     """
 
     lesion_id: str
@@ -73,6 +75,8 @@ class LesionExplanation:
     lesion_m: FloatArray
     first_paths: Mapping[str, FloatArray]
     paths: Mapping[str, FloatArray]
+    first_untraced: tuple[str, ...] = ()
+    untraced: tuple[str, ...] = ()
 
 
 def explain_lesion(
@@ -124,6 +128,8 @@ def explain_lesion(
     if outcome is None:
         return None
     answer = surface.vertices[outcome.vertex] if answer_m is None else np.asarray(answer_m, dtype=float)
+    first_paths, first_untraced = _paths(first, fields1, pick.point, kind)
+    paths, untraced = _paths(followup, fields2, surface.nearest(answer)[0], kind)
     return LesionExplanation(
         lesion_id=query.id,
         anchor_names=names,
@@ -136,23 +142,30 @@ def explain_lesion(
         mean_m=outcome.mean_m,
         answer_m=answer,
         lesion_m=np.asarray(pick.point.position_m),
-        first_paths=_paths(first, fields1, pick.point, kind),
-        paths=_paths(followup, fields2, surface.nearest(answer)[0], kind),
+        first_paths=first_paths,
+        paths=paths,
+        first_untraced=first_untraced,
+        untraced=untraced,
     )
 
 
 def _paths(
     analysed: AnalysedCapture, fields: GeodesicFields, target: SurfacePoint, kind: GeodesicKind
-) -> dict[str, FloatArray]:
-    """Paths from a place to every anchor that it is connected to."""
+) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
+    """Paths from a place to every anchor that it is connected to, and the anchors to which none was found."""
     surface = analysed.scan.surface
     solver = FIELDS.solver(surface, kind)
     if kind == "delaunay-fast-marching":
         solver = FIELDS.solver(surface, "virtual-source")
         fields = FIELDS.fields(surface, anchor_points(analysed, fields.names), "virtual-source")
     reached = np.asarray(np.isfinite(fields.distances[:, surface.triangles[target.triangle]]).all(axis=1))
-    return {
-        name: trace_path(solver, fields.distances[i], target, source=analysed.anchors[name].point)
-        for i, name in enumerate(fields.names)
-        if reached[i]
-    }
+    paths: dict[str, FloatArray] = {}
+    untraced = []
+    for name, distances, connected in zip(fields.names, fields.distances, reached, strict=True):
+        if not connected:
+            continue
+        try:
+            paths[name] = trace_path(solver, distances, target, source=analysed.anchors[name].point)
+        except WorkError:  # one way that cannot be drawn must not hide the others
+            untraced.append(name)
+    return paths, tuple(untraced)

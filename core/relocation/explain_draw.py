@@ -106,8 +106,8 @@ def draw_explanation(
     return {
         "1-paths-first": _with_legend(
             _draw_paths(before, explanation.first_paths, colors, explanation.lesion_m),
-            f"Lesion {lesion}: first visit",
-            "Shortest ways along the skin to the anchors",
+            f"Lesion {lesion}: earlier visit",
+            "Shortest ways along the skin to the anchors" + _left_out(explanation.first_untraced),
             _distance_rows(explanation, colors),
         ),
         "2-bands": _with_legend(
@@ -135,7 +135,7 @@ def draw_explanation(
         "5-paths-followup": _with_legend(
             _draw_paths(after, explanation.paths, colors, explanation.answer_m),
             f"Lesion {lesion}: follow-up",
-            "The same ways from the place that was found",
+            "The same ways from the place that was found" + _left_out(explanation.untraced),
             _distance_rows(explanation, colors, explanation.paths),
         ),
     }
@@ -221,8 +221,16 @@ def _distance_rows(
         if paths is not None and name in paths:
             distance = float(np.linalg.norm(np.diff(paths[name], axis=0), axis=1).sum())
         text = f"{100 * distance:.1f} cm" if np.isfinite(distance) else "not connected"
+        if paths is not None and name not in paths:
+            text = "no path" if name in explanation.untraced else "not connected"
         rows.append((colors[name], f"{name.replace('_', ' ')}   {text}"))
     return tuple(rows)
+
+
+def _left_out(untraced: Sequence[str]) -> str:
+    """What a legend says about ways that could not be drawn."""
+    names = ", ".join(name.replace("_", " ") for name in untraced)
+    return f". No path could be followed to: {names}" if names else ""
 
 
 def _vote_rows(explanation: LesionExplanation) -> tuple[tuple[Color, str], ...]:
