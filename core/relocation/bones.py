@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,22 @@ from core.relocation.pair import VisitPair
 
 FloatArray = NDArray[np.float64]
 
+Part = Literal["head", "trunk", "upper arm", "forearm", "thigh", "lower leg"]
+
+PART_OF_BONE: dict[str, Part] = {
+    "trunk": "trunk",
+    "neck to head": "head",
+    "shoulder to elbow": "upper arm",
+    "elbow to hand": "forearm",
+    "hip to knee": "thigh",
+    "knee to foot": "lower leg",
+}
+
 TORSO = ("neck", "torso", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 RADIUS_M = {"torso": 0.15, "upper": 0.09, "fore": 0.06}
 """Usual radii of body parts: a place belongs to the bone nearest in these units (METHOD section 3)."""
+
+LEAST_BONE_M = 0.03
 
 LIMB_BONES = (
     ("left_shoulder", "left_elbow", "left_hand", 0.09, 0.06),
@@ -38,6 +52,13 @@ class Bone:
     rotation: FloatArray
     moved_start: FloatArray
     parent: int | None = None
+
+    @property
+    def spoken(self) -> str:
+        """Name of the body part for a sentence: "left upper arm", "trunk"."""
+        side = self.name.split("_")[0]
+        part = PART_OF_BONE[self.name.replace("left_", "").replace("right_", "")]
+        return f"{side} {part}" if side in ("left", "right") else part
 
 
 def rigid_fit(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -93,13 +114,13 @@ def bones(pair: VisitPair) -> tuple[Bone, ...]:
     for root, middle, tip, thick, thin in LIMB_BONES:
         parent, parent_bone = rotation, 0
         for near, far, radius in ((root, middle, thick), (middle, tip, thin)):
-            if near not in shared or far not in shared:
+            if near not in shared or far not in shared or not _long_enough(pair, near, far):
                 break
             (a1, a2), (b1, b2) = pair.joints_m(near), pair.joints_m(far)
             parent = minimal_rotation(parent @ (b1 - a1), b2 - a2) @ parent
             out.append(Bone(f"{near} to {far}", a1, b1, radius, parent, a2, parent_bone))
             parent_bone = len(out) - 1
-    if {"neck", "head"} <= shared:
+    if {"neck", "head"} <= shared and _long_enough(pair, "neck", "head"):
         (a1, a2), (b1, b2) = pair.joints_m("neck"), pair.joints_m("head")
         out.append(
             Bone(
@@ -113,6 +134,12 @@ def bones(pair: VisitPair) -> tuple[Bone, ...]:
             )
         )
     return tuple(out)
+
+
+def _long_enough(pair: VisitPair, near: str, far: str) -> bool:
+    """Whether a bone has a direction in both visits; joints on one point have none."""
+    (a1, a2), (b1, b2) = pair.joints_m(near), pair.joints_m(far)
+    return min(float(np.linalg.norm(b1 - a1)), float(np.linalg.norm(b2 - a2))) > LEAST_BONE_M
 
 
 def _trunk(

@@ -10,6 +10,7 @@ from core.relocation.bones import torso_rotation
 from core.relocation.field_store import FIELDS
 from core.relocation.pair import VisitPair, anchor_points
 from core.relocation.signatures import LEAST_ANCHORS
+from core.relocation.views import opposite
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ PAIR_LEAST_M = 0.15
 
 def why_not(pair: VisitPair) -> str:
     """Why these captures carry no answer for any lesion; empty when they do."""
+    if opposite(pair.first, pair.followup):
+        return "The two captures show opposite sides of the body."
     rotation = torso_rotation(pair)
     if rotation is not None:
         angle = np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0)))

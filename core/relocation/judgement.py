@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from core.relocation.bones import Bone
+from core.relocation.bones import Bone, Part
 from core.relocation.calibration95 import Kind, factor95
 from core.relocation.pair import VisitPair
 from core.relocation.posterior import radius95_m
+from core.relocation.recognition import Recognition
 from core.relocation.sight import Sight, look_at
 from core.relocation.spread import (
+    PIXEL_SHARE,
     SEEN_M,
-    Part,
     Spread,
     body_part,
     carried_spread,
@@ -38,6 +39,10 @@ MOST_OFF_M, MOST_SIGMA_M = 0.006, 0.006
 
 On the calibration patients 98 % of right matches keep both, 4 of 5 wrong ones do not. A lesion that the first
 picture does not show as a spot is never "seen again": what should be recognised?"""
+DOUBT, DISBELIEVED = 0.5, 0.3
+"""Factors of the confidence where the person is in doubt, and where distances along the skin disagree."""
+FAR_OFF = 1.5
+"""Distances along the skin disagree beyond so many of their own radii."""
 CONFIDENT_M = 0.010
 """`Estimate.confidence` is the probability that the answer is nearer to the truth than this."""
 GEODESIC_SCALE, GEODESIC_LEAST_M = 4.0, 0.030
@@ -56,11 +61,15 @@ class _Seen:
     probability: FloatArray
 
 
-def judge(pair: VisitPair, transfer: Transfer, fixes: tuple[Fix | None, ...] | None) -> tuple[Estimate, ...]:
+def judge(
+    pair: VisitPair, transfer: Transfer, recognition: Recognition, fixes: tuple[Fix | None, ...] | None
+) -> tuple[Estimate, ...]:
     """One estimate per lesion of a transfer.
 
     Parameters
     ----------
+    recognition : Recognition
+        Whether person and limbs were recognised.
     fixes : tuple of Fix or None, optional
         What geodesic trilateration says about each lesion; without it the registration stands alone.
     """
@@ -74,11 +83,21 @@ def judge(pair: VisitPair, transfer: Transfer, fixes: tuple[Fix | None, ...] | N
         other_stance=transfer.other_stance,
     )
     return tuple(
-        _judge_one(pair, transfer, row, sight, None if fixes is None else fixes[row]) for row in range(count)
+        _judge_one(
+            pair,
+            transfer,
+            int(transfer.moles.twin[row]),
+            sight,
+            recognition,
+            None if fixes is None else fixes[row],
+        )
+        for row in range(count)
     )
 
 
-def _judge_one(pair: VisitPair, transfer: Transfer, row: int, sight: Sight, fix: Fix | None) -> Estimate:
+def _judge_one(
+    pair: VisitPair, transfer: Transfer, row: int, sight: Sight, recognition: Recognition, fix: Fix | None
+) -> Estimate:
     surface = pair.followup.scan.surface
     place = transfer.moles.places[row]
     number = int(transfer.start.owners.at(place[None])[0])
@@ -86,15 +105,17 @@ def _judge_one(pair: VisitPair, transfer: Transfer, row: int, sight: Sight, fix:
     part = body_part(bone)
     seen = _possible_spots(transfer, row)
     partner = int(transfer.matching.partner[row])
+    lost = _not_found(bone) if number in transfer.start.lost else recognition.of_limb(number)
     believed = (
-        transfer.moles.spot[row] >= 0
+        not (recognition.doubtful or lost)
+        and transfer.moles.spot[row] >= 0
         and sight.off_m[row] < MOST_OFF_M
         and transfer.matching.sigma_m[row] < MOST_SIGMA_M
     )
     if believed and len(seen.rows) and seen.rows[0] == partner and seen.probability[0] >= SURE:
         return _seen_again(transfer, row, part, partner, seen, fix)
-    if number in transfer.start.lost:
-        return Estimate(None, hidden=sight.hidden[row], reason=_not_found(bone))
+    if lost:
+        return Estimate(None, hidden=sight.hidden[row], reason=lost)
     expected = transfer.matching.expected[row]
     on_skin = surface.nearest(expected)[0]
     normal = surface.normal_at(on_skin)
@@ -114,10 +135,10 @@ def _judge_one(pair: VisitPair, transfer: Transfer, row: int, sight: Sight, fix:
     return Estimate(
         point_m=on_skin.position_m,
         radius95_m=radius,
-        confidence=_within(CONFIDENT_M, covariance),
+        confidence=_within(CONFIDENT_M, covariance) * (DOUBT if recognition.doubtful else 1.0),
         vertex=int(surface.nearest_vertex(on_skin.position_m)[0]),
         hidden=sight.hidden[row],
-        candidates=_candidates(transfer, seen),
+        candidates=_candidates(transfer, seen, on_skin.position_m, radius),
         region=region,
         reason=reason,
         agreement_m=agreement,
@@ -130,24 +151,27 @@ def _seen_again(
     spots = transfer.spots
     point = spots.points_m[partner]
     steep = 1.0 / float(np.clip(-(spots.normals[partner] @ point) / np.linalg.norm(point), 0.3, 1.0))
-    spread = Spread(tangent_basis(spots.normals[partner]), (SEEN_M * steep, SEEN_M * steep))
+    size = float(np.hypot(SEEN_M, PIXEL_SHARE * transfer.pixel_m)) * steep
+    spread = Spread(tangent_basis(spots.normals[partner]), (size, size))
     region, radius = region_of(
         spread.basis, spread.covariance(), factor95("seen", transfer.other_stance, part)
     )
-    agreement, reason = None, "Seen again in the picture."
+    agreement, reason, doubt = None, "Seen again in the picture.", 1.0
+    others = _candidates(transfer, _Seen(seen.rows[1:], seen.probability[1:]), point, radius)
     if fix is not None:
         agreement = float(np.linalg.norm(fix.point_m - point))
-        if agreement > radius95_m(fix) + radius:
-            reason = f"Seen again in the picture, but {_disagreement(agreement)}"
+        if agreement > FAR_OFF * radius95_m(fix) + radius:
+            reason = f"A spot like it was seen in the picture, but {_disagreement(agreement)}"
+            others, doubt = (*others, Candidate(fix.point_m, DISBELIEVED)), DISBELIEVED
     return Estimate(
         point_m=point,
         radius95_m=radius,
-        confidence=float(seen.probability[0]) * _within(CONFIDENT_M, spread.covariance()),
+        confidence=doubt * float(seen.probability[0]) * _within(CONFIDENT_M, spread.covariance()),
         vertex=-1,
-        candidates=_candidates(transfer, _Seen(seen.rows[1:], seen.probability[1:])),
+        candidates=others,
         region=region,
         reason=reason,
-        appearance_matched=True,
+        appearance_matched=doubt == 1.0,
         pixel=(float(spots.pixels[partner, 0]), float(spots.pixels[partner, 1])),
         agreement_m=agreement,
     )
@@ -176,11 +200,14 @@ def _possible_spots(transfer: Transfer, row: int) -> _Seen:
     return _Seen(rows[order], probability[order])
 
 
-def _candidates(transfer: Transfer, seen: _Seen) -> tuple[Candidate, ...]:
+def _candidates(
+    transfer: Transfer, seen: _Seen, answer: FloatArray, radius_m: float
+) -> tuple[Candidate, ...]:
+    """Likely spots at other places than the answer's own region."""
     return tuple(
         Candidate(transfer.spots.points_m[r], float(p))
         for r, p in zip(seen.rows[:3], seen.probability[:3], strict=True)
-        if p >= POSSIBLE
+        if p >= POSSIBLE and float(np.linalg.norm(transfer.spots.points_m[r] - answer)) > radius_m
     )
 
 

@@ -44,6 +44,8 @@ class FirstMoles:
         So many of the first rows are lesions.
     healed : ndarray (m,) bool
         Lesions that are no longer there.
+    twin : ndarray (m,)
+        Row that answers for this one: of lesions marked on the same spot the first, else the row itself.
     """
 
     places: FloatArray
@@ -52,6 +54,7 @@ class FirstMoles:
     spot: IntArray
     lesions: int
     healed: NDArray[np.bool_]
+    twin: IntArray
 
     def looks(self, first: SkinSpots, followup: SkinSpots) -> FloatArray:
         """Cost (m, k) of being a spot of the follow-up by looks alone, -2 log likelihood ratio."""
@@ -60,7 +63,7 @@ class FirstMoles:
         if len(known) and len(followup):
             away = appearance_distance(first, self.spot[known], followup, np.arange(len(followup)))
             cost[known] = np.clip(LOOKS_SHARE * away, LEAST_LOOKS, MOST_LOOKS)
-        cost[self.healed] = NEVER
+        cost[self.healed | (self.twin != np.arange(len(self.twin)))] = NEVER
         return cost
 
 
@@ -108,7 +111,14 @@ def gather_moles(
         np.array([*row, *rest], np.int64),
         len(lesions),
         healed,
+        np.array([*_first_with(row), *range(len(row), len(every))], np.int64),
     )
+
+
+def _first_with(spots: list[int]) -> list[int]:
+    """For every lesion the first one that was marked on the same spot."""
+    first: dict[int, int] = {}
+    return [number if spot < 0 else first.setdefault(spot, number) for number, spot in enumerate(spots)]
 
 
 def limb_coordinates(places: FloatArray, start: SkeletonStart) -> FloatArray:

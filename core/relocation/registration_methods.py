@@ -8,6 +8,7 @@ from core.relocation.geodesic_check import geodesic_fixes
 from core.relocation.judgement import judge
 from core.relocation.lone_spots import new_spots, vanished_spots
 from core.relocation.pair import PickedLesion, VisitPair
+from core.relocation.recognition import recognise
 from core.relocation.registry import MethodContext, MethodOutcome
 from core.relocation.transfer import Transfer, transfer_skin
 from core.relocation.trilateration import Fix
@@ -59,8 +60,13 @@ def _outcome(
     pair: VisitPair, transfer: Transfer, fixes: tuple[Fix | None, ...] | None, context: MethodContext
 ) -> MethodOutcome:
     with context.clock.phase("judgement"):
+        recognition = recognise(pair, transfer)
+        if recognition.obstacle:
+            refused = Estimate(None, reason=recognition.obstacle)
+            return MethodOutcome((refused,) * transfer.moles.lesions)
         return MethodOutcome(
-            judge(pair, transfer, fixes),
+            judge(pair, transfer, recognition, fixes),
+            warnings=recognition.warnings,
             sight_judged=True,
             new_spots=new_spots(pair, transfer),
             vanished_spots=vanished_spots(pair, transfer),

@@ -102,14 +102,14 @@ def relocate(
         by_skeleton = options.check_visibility and not outcome.sight_judged and placed and not obstacle
         skeleton = bones(pair) if by_skeleton else ()
         estimates = dict(
-            zip((p.query.id for p in placed), zip(placed, outcome.estimates, strict=False), strict=False)
+            zip((id(p.query) for p in placed), zip(placed, outcome.estimates, strict=False), strict=False)
         )
         lesions = tuple(
             _refused(query, pick.reason or "The click is not on the skin.")
             if pick.point is None
             else _refused(query, obstacle)
             if obstacle
-            else _answer(pair, *estimates[query.id], skeleton, options)
+            else _answer(pair, *estimates[id(query)], skeleton, options)
             for query, pick in zip(queries, picks, strict=True)
         )
     progress(1.0, "Done")

@@ -10,30 +10,20 @@ appear in no accuracy table.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.relocation.bones import Bone
+from core.relocation.bones import PART_OF_BONE, Bone, Part
 from core.relocation.tangent import tangent_basis
 from core.relocation.types import Region
 
 FloatArray = NDArray[np.float64]
 
-Part = Literal["head", "trunk", "upper arm", "forearm", "thigh", "lower leg"]
-
-_PARTS: dict[str, Part] = {
-    "trunk": "trunk",
-    "neck to head": "head",
-    "shoulder to elbow": "upper arm",
-    "elbow to hand": "forearm",
-    "hip to knee": "thigh",
-    "knee to foot": "lower leg",
-}
-
 SEEN_M = 0.0035
 """Spread per axis of a spot that was seen again: depth in both visits and its own centre."""
+PIXEL_SHARE = 0.5
+"""Share of a picture pixel by which a spot's centre errs: it counts with coarse pictures."""
 CARRIED_M: dict[Part, tuple[float, float]] = {
     "head": (0.006, 0.008),
     "trunk": (0.004, 0.006),
@@ -78,8 +68,7 @@ class Spread:
 
 def body_part(bone: Bone) -> Part:
     """The part of the body that a bone carries."""
-    name = bone.name
-    return _PARTS[name.replace("left_", "").replace("right_", "")]
+    return PART_OF_BONE[bone.name.replace("left_", "").replace("right_", "")]
 
 
 def skin_basis(normal: FloatArray, part: Part, bone: Bone) -> FloatArray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from core.anchors import AnalysedCapture
 from core.lesions import SkinSpots
 from core.relocation.bones import rigid_fit, torso_joints
 from core.relocation.constellation import Matching, Side, match_spots, vote_locally
@@ -49,6 +50,8 @@ class Transfer:
         `Matching.expected` is where each should be, on or near the seen skin.
     registration : DenseRegistration
     other_stance : bool
+    pixel_m : float
+        Size of a picture pixel on the follow-up's skin.
     """
 
     moles: FirstMoles
@@ -60,6 +63,7 @@ class Transfer:
     matching: Matching
     registration: DenseRegistration
     other_stance: bool
+    pixel_m: float
 
     @property
     def extent_m(self) -> float:
@@ -100,7 +104,24 @@ def transfer_skin(
             context.progress(0.5 + 0.2 * turn, "Matching the moles of both visits")
             engine.draw()
         carried, normals, matching = engine.match()
-    return Transfer(moles, first_spots, spots, engine.looks, carried, normals, matching, registration, other)
+    return Transfer(
+        moles,
+        first_spots,
+        spots,
+        engine.looks,
+        carried,
+        normals,
+        matching,
+        registration,
+        other,
+        _pixel_m(pair.followup),
+    )
+
+
+def _pixel_m(capture: AnalysedCapture) -> float:
+    """Size of a picture pixel on the skin."""
+    distance = float(np.median(capture.scan.surface.vertices[:, 2]))
+    return distance / capture.capture.rig.picture_camera.fx
 
 
 class _Matcher:

@@ -36,7 +36,7 @@ class Crossing:
         angle = turn_deg(VisitPair(first, followup))
         sides = {first.capture.view, followup.capture.view}
         other_name = len(sides) == 2 and sides <= set(OPPOSITE)
-        self.is_crossing = other_name if angle is None else angle > TURNED_DEG
+        self.is_crossing = other_name or (angle is not None and angle > TURNED_DEG)
         self._bridge = BoneBridge(first, followup) if self.is_crossing else None
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors import Skeleton
-from core.relocation.bones import LIMB_BONES, Bone, bones, minimal_rotation
+from core.relocation.bones import LEAST_BONE_M, LIMB_BONES, Bone, bones, minimal_rotation
 from core.relocation.pair import VisitPair
 from core.relocation.registration.patches import SkinOwners
 
@@ -110,7 +110,10 @@ def _lost_bones(pair: VisitPair, skeleton: tuple[Bone, ...]) -> tuple[Bone, ...]
             if name in number:
                 parent = number[name]
                 continue
-            if not first.sees(start, end):
+            if (
+                not first.sees(start, end)
+                or float(np.linalg.norm(first.point(end) - first.point(start))) < LEAST_BONE_M
+            ):
                 break
             above = (*skeleton, *out)[parent]
             a, b = first.point(start), first.point(end)
