@@ -15,7 +15,7 @@ def _beyond(half_pixels: float, per_pixel: float, slope: float, z: float) -> flo
     """
     step = half_pixels * per_pixel
     outer = slope + step
-    return step * z / np.sqrt(1.0 + outer * outer)
+    return float(step * z / np.sqrt(1.0 + outer * outer))
 
 
 @njit(cache=True, nogil=True)

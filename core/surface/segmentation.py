@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from core.capture.camera import PinholeCamera
 from core.errors import WorkError
 from core.surface.planes import find_floor, find_walls
+from core.surface.threads import one_linear_algebra_thread
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -78,7 +79,8 @@ def segment_body(depth_m: FloatArray, camera: PinholeCamera) -> BodyMask:
     """
     depth = np.where((depth_m > 0) & (depth_m < _FARTHEST_M), depth_m, 0.0)
     points = camera.backproject(depth)
-    depth = np.where(_in_room(points, depth, camera), depth, 0.0)
+    with one_linear_algebra_thread():
+        depth = np.where(_in_room(points, depth, camera), depth, 0.0)
     parts = _connected_parts(points, depth, camera)
     main = _main_part(parts, points)
     if main is None:

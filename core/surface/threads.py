@@ -8,7 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import cache
 from itertools import pairwise
+
+from threadpoolctl import ThreadpoolController
 
 _THREADS = 4
 
@@ -23,3 +27,14 @@ def in_chunks(work: Callable[[int, int], None], count: int, smallest: int) -> No
     with ThreadPoolExecutor(_THREADS) as pool:
         for task in [pool.submit(work, first, last) for first, last in ranges]:
             task.result()
+
+
+def one_linear_algebra_thread() -> AbstractContextManager[object]:
+    """For small systems: threads of NumPy's linear algebra library only wait for each other."""
+    limited: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
+    return limited
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()
