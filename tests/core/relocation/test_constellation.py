@@ -143,6 +143,22 @@ def test_a_match_that_all_others_contradict_is_rejected(seed):
     assert (found.partner[others] == np.flatnonzero(others)).all()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_wrong_match_among_few_does_not_drag_the_others(seed):
+    """Seven spots a hand apart: the process alone would believe the wrong one; leaving it out tells."""
+    rng = np.random.default_rng(seed)
+    places = scattered(rng, 7, 0.24, 0.056)
+    middle = int(np.linalg.norm(places[:, :2], axis=1).argmin())
+    slid = np.array([0.008, 0.0, 0.0])
+    spots = places + slid + rng.normal(0, 0.0005, places.shape)
+    spots[middle] = places[middle] - slid
+    found = match_spots(side_of(places), spots, np.zeros((7, 7)))
+    assert not found.sure[middle]
+    others = np.arange(7) != middle
+    assert found.sure[others].all()
+    assert np.linalg.norm(found.expected[middle] - places[middle] - slid) < 0.004
+
+
 COSTS = st.tuples(st.integers(1, 7), st.integers(1, 7), SEEDS)
 
 

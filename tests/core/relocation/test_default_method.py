@@ -328,9 +328,13 @@ def test_a_limb_that_the_follow_up_does_not_show_is_not_invented(simulated_visit
     wrist = first.scan.surface.nearest(0.3 * elbow + 0.7 * hand + [0.0, 0.0, -0.04])[0].position_m
     u, v = truth.rig.project_to_picture(wrist)[0]
     blind = without(simulated_visits.other, ("right_elbow", "right_hand"))
-    (lesion,) = relocate(first, blind, [LesionQuery("wrist", (float(u), float(v)))]).lesions
+    asked = [LesionQuery("wrist", (float(u), float(v)))]
+    (lesion,) = relocate(first, blind, asked).lesions
     assert lesion.status in ("refused", "not_visible")
     assert not lesion.has_point
+    (wanted,) = relocate(first, blind, asked, options=RelocationOptions(check_visibility=False)).lesions
+    assert wanted.status == "refused"
+    assert "right forearm" in wanted.reason
 
 
 def test_hidden_lesions_are_said_to_be_hidden_unless_a_place_is_wanted_all_the_same(simulated_visits):
