@@ -9,6 +9,7 @@ from core.relocation.judgement import judge
 from core.relocation.lone_spots import new_spots, vanished_spots
 from core.relocation.pair import PickedLesion, VisitPair
 from core.relocation.recognition import recognise
+from core.relocation.registration.dense import one_linear_algebra_thread
 from core.relocation.registry import MethodContext, MethodOutcome
 from core.relocation.transfer import Transfer, transfer_skin
 from core.relocation.trilateration import Fix
@@ -28,10 +29,11 @@ class RegistrationMethod:
         self, pair: VisitPair, lesions: Sequence[PickedLesion], context: MethodContext
     ) -> MethodOutcome:
         """One estimate per lesion."""
-        transfer = transfer_skin(pair, lesions, context)
-        if transfer is None:
-            return MethodOutcome(tuple(Estimate(None, reason=NO_TRUNK) for _ in lesions))
-        return _outcome(pair, transfer, None, context)
+        with one_linear_algebra_thread():
+            transfer = transfer_skin(pair, lesions, context)
+            if transfer is None:
+                return MethodOutcome(tuple(Estimate(None, reason=NO_TRUNK) for _ in lesions))
+            return _outcome(pair, transfer, None, context)
 
 
 class FusedMethod:
@@ -48,12 +50,13 @@ class FusedMethod:
         self, pair: VisitPair, lesions: Sequence[PickedLesion], context: MethodContext
     ) -> MethodOutcome:
         """One estimate per lesion."""
-        transfer = transfer_skin(pair, lesions, context)
-        if transfer is None:
-            outcome = TrilaterationMethod().estimate(pair, lesions, context)
-            return MethodOutcome(outcome.estimates, (*outcome.warnings, GEODESICS_ALONE))
-        context.progress(0.9, "Checking with distances along the skin")
-        return _outcome(pair, transfer, geodesic_fixes(pair, lesions, context), context)
+        with one_linear_algebra_thread():
+            transfer = transfer_skin(pair, lesions, context)
+            if transfer is None:
+                outcome = TrilaterationMethod().estimate(pair, lesions, context)
+                return MethodOutcome(outcome.estimates, (*outcome.warnings, GEODESICS_ALONE))
+            context.progress(0.9, "Checking with distances along the skin")
+            return _outcome(pair, transfer, geodesic_fixes(pair, lesions, context), context)
 
 
 def _outcome(

@@ -9,7 +9,7 @@ from core.anchors.analyse import AnalysedCapture, with_skeleton
 from core.anchors.left_right import Sides, guard_left_right, shoulder_order_m
 from core.anchors.names import opposite
 from core.relocation.pair import VisitPair
-from core.relocation.registration.dense import register_skins
+from core.relocation.registration.dense import one_linear_algebra_thread, register_skins
 
 CLEARLY = 0.10
 """The other labeling must cover this much more of the skin to be taken."""
@@ -32,7 +32,9 @@ def with_sides_settled(pair: VisitPair) -> tuple[VisitPair, tuple[str, ...]]:
     which = doubtful[0]
     own: AnalysedCapture = getattr(pair, which)
     other = replace(pair, **{which: with_skeleton(own.scan, exchanged(own.skeleton))})
-    if _covered(other) < max(LEAST_COVERED, _covered(pair) + CLEARLY):
+    with one_linear_algebra_thread():
+        better = _covered(other) >= max(LEAST_COVERED, _covered(pair) + CLEARLY)
+    if not better:
         return pair, ()
     word = "follow-up's" if which == "followup" else "first visit's"
     return other, (EXCHANGED.format(which=word),)

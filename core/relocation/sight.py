@@ -66,7 +66,7 @@ def look_at(
     if rig.color is not None:
         eyes.append(rig.picture_from_depth.inverse().translation)
         inside &= rig.color.contains(rig.project_to_picture(places), FRAME_MARGIN_PX)
-    nearest = np.array([p.position_m for p in surface.nearest(places)])
+    nearest = surface.nearest_arrays(places)[2]
     off = np.linalg.norm(nearest - places, axis=1)
     cosine = np.ones(len(places))
     covered = np.zeros(len(places), bool)

@@ -165,7 +165,7 @@ class _Matcher:
         side, carried, normals = self._side()
         matching = match_spots(side, self._spots.points_m, self.looks)
         if len(carried):
-            on_skin = np.array([p.position_m for p in self._surface.nearest(matching.expected)])
+            on_skin = self._surface.nearest_arrays(matching.expected)[2]
             matching = Matching(matching.partner, matching.sure, on_skin, matching.sigma_m)
         return carried, normals, matching
 
@@ -184,7 +184,7 @@ class _Matcher:
             nothing = np.zeros((0, 3))
             return Side(moles.coordinates, nothing, nothing, np.zeros(0)), nothing, nothing
         carried, normals = self._registration.deformation.warp(moles.places, moles.normals)
-        on_skin = np.array([p.position_m for p in self._surface.nearest(carried)])
+        on_skin = self._surface.nearest_arrays(carried)[2]
         off = np.linalg.norm(on_skin - carried, axis=1)
         drift = self._drift * np.clip(off / OFF_M, 1.0, MOST_DOUBT)
         return Side(moles.coordinates, on_skin, normals, drift), carried, normals

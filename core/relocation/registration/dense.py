@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,22 +50,20 @@ class DenseRegistration:
         self.start = start
         self._target = pair.followup.scan.surface
         self._joints = joint_landmarks(pair)
-        with one_linear_algebra_thread():
-            graph = build_graph(net, start.owners, seed=seed)
-            self.deformation = EmbeddedDeformation(graph, start)
-            self.deformation.solve(self._target, FIRST_STAGES, self._joints)
-            self.deformation.return_to_rest()
-            self.fit: Fit = self.deformation.solve(self._target, SECOND_STAGES, self._joints)
+        graph = build_graph(net, start.owners, seed=seed)
+        self.deformation = EmbeddedDeformation(graph, start)
+        self.deformation.solve(self._target, FIRST_STAGES, self._joints)
+        self.deformation.return_to_rest()
+        self.fit: Fit = self.deformation.solve(self._target, SECOND_STAGES, self._joints)
 
-    @property
+    @cached_property
     def seen_radius_m(self) -> float:
         """Radius of a disc as large as the follow-up's seen skin."""
         return float(np.sqrt(vertex_areas(self._target.vertices, self._target.triangles).sum() / np.pi))
 
     def draw(self, landmarks: Landmarks) -> None:
         """Solve again with places of the first skin whose place on the follow-up is known."""
-        with one_linear_algebra_thread():
-            self.fit = self.deformation.solve(self._target, MATCH_STAGES, self._joints, landmarks)
+        self.fit = self.deformation.solve(self._target, MATCH_STAGES, self._joints, landmarks)
 
 
 def register_skins(pair: VisitPair, *, seed: int = 0) -> DenseRegistration | None:
@@ -76,7 +74,7 @@ def register_skins(pair: VisitPair, *, seed: int = 0) -> DenseRegistration | Non
 
 
 def one_linear_algebra_thread() -> AbstractContextManager[object]:
-    """The systems are small: threads of the linear algebra library only wait for each other.
+    """Around a whole registration: its systems are small, threads of the linear algebra library only wait for each other.
 
     Measured on two busy cores: 7.6 ms a solution with one thread, 340 ms with two.
     """
