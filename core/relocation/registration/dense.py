@@ -74,7 +74,7 @@ def register_skins(pair: VisitPair, *, seed: int = 0) -> DenseRegistration | Non
 
 
 def one_linear_algebra_thread() -> AbstractContextManager[object]:
-    """Around a whole registration: its systems are small, threads of the linear algebra library only wait for each other.
+    """Around a whole registration: its systems are small, and threads would only wait for each other.
 
     Measured on two busy cores: 7.6 ms a solution with one thread, 340 ms with two.
     """
