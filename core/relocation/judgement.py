@@ -34,6 +34,8 @@ AGAIN = 0.85
 SURE, POSSIBLE = 0.5, 0.2
 """Posterior of the best spot from which on it counts as seen again, and of others worth telling."""
 REACH = 3.5
+MOST_RADIUS_M = 0.10
+TOO_WIDE = "The place is known only to {size:.0f} cm: nothing around it was recognised."
 MOST_OFF_M, MOST_SIGMA_M = 0.006, 0.006
 """A spot counts as seen again only where the skin around it lies on the follow-up's, and matches are near.
 
@@ -132,6 +134,8 @@ def _judge_one(
         on_skin = surface.nearest(point)[0]
     kind: Kind = "matched" if len(transfer.spots) else "geometry"
     region, radius = region_of(spread.basis, covariance, factor95(kind, transfer.other_stance, part))
+    if radius > MOST_RADIUS_M:
+        return Estimate(None, hidden=sight.hidden[row], reason=TOO_WIDE.format(size=100.0 * radius))
     return Estimate(
         point_m=on_skin.position_m,
         radius95_m=radius,
