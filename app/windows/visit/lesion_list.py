@@ -22,6 +22,8 @@ from app.theme import palette
 from app.widgets.markers import marker_color
 
 _ID = Qt.ItemDataRole.UserRole
+_WIDEST_STATUS, _STATUS_ROOM = 288, 56
+"""Pixels of the status column: at most, and beside its text. The site takes what is left."""
 _TONE = Qt.ItemDataRole.UserRole + 1
 
 
@@ -80,7 +82,7 @@ class LesionList(QTableWidget):
         header.setMinimumSectionSize(40)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self.setColumnWidth(0, 44)
-        self.setColumnWidth(2, 288)
+        self.setColumnWidth(2, _WIDEST_STATUS)
         self._quiet = False
         self.itemSelectionChanged.connect(self._on_selection)
         self.itemActivated.connect(lambda item: self.lesion_activated.emit(str(item.data(_ID))))
@@ -90,6 +92,8 @@ class LesionList(QTableWidget):
         selected = self.selected()
         self._quiet = True
         self.setRowCount(len(lines))
+        widest = max((self.fontMetrics().horizontalAdvance(line.status) for line in lines), default=0)
+        self.setColumnWidth(2, min(_WIDEST_STATUS, widest + _STATUS_ROOM))
         for row, line in enumerate(lines):
             texts = (str(line.number), line.site or "no site", line.status)
             for column, text in enumerate(texts):
