@@ -23,6 +23,8 @@ FRAME_MARGIN_PX = 2.0
 WEIGHTS = (-1.66, -6.59, 1.99, 2.32, 0.56)
 """Of 1, the cosine of the carried skin to the camera, its distance to seen skin in centimetres, the cosine of
 that skin, and another stance: a logistic model of being hidden."""
+PIXEL_M = 0.006
+"""Largest depth pixel on the skin for which distances hold; a coarser camera counts in its own pixels."""
 HIDDEN_LOGIT = -1.2
 """From here on a place counts as hidden: 84 % of hidden and 2.5 % of visible calibration places."""
 TURNED_COSINE = 0.10
@@ -76,7 +78,8 @@ def look_at(
         cosine = np.minimum(cosine, np.einsum("ki,ki->k", normals, way) / length)
         hits = surface.raycast(eye, -way / length[:, None])
         covered |= hits.hit & (hits.t < length - COVERED_M)
-    gone = _logit(cosine, off, surface, nearest, other_stance) > HIDDEN_LOGIT
+    coarse = min(1.0, PIXEL_M * rig.depth.fx / float(np.median(surface.vertices[:, 2])))
+    gone = _logit(cosine, coarse * off, surface, nearest, other_stance) > HIDDEN_LOGIT
     hidden = tuple(
         OUTSIDE
         if not inside[k]
