@@ -32,7 +32,7 @@ PAIR_LEAST_M = 0.15
 def why_not(pair: VisitPair) -> str:
     """Why these captures carry no answer for any lesion; empty when they do."""
     if opposite(pair.first, pair.followup):
-        return "The two captures show opposite sides of the body."
+        return "The two captures show different sides of the body, as their views say."
     rotation = torso_rotation(pair)
     if rotation is not None:
         angle = np.degrees(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1.0, 1.0)))

@@ -8,6 +8,7 @@ than that, one pair of spots with its normals gives a local motion, and the neig
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,7 @@ def match_spots(
     looks: FloatArray,
     *,
     known: dict[int, int] | None = None,
+    held: Mapping[int, FloatArray] | None = None,
 ) -> Matching:
     """Match by expected place and looks, the surest first.
 
@@ -96,12 +98,18 @@ def match_spots(
         Cost of looking different, -2 log likelihood ratio.
     known : mapping of first row to follow-up row, optional
         Matches that are certain.
+    held : mapping of first row to place (3,), optional
+        Rows whose place is certain though it need not be a spot: they carry the drift of the others.
     """
     count = len(side.predicted)
     prior = float(np.median(side.drift_m)) if count else 1.0
     scale = np.maximum(side.drift_m / prior, 1.0)
     expected, sigma = side.predicted.copy(), np.hypot(side.drift_m, NOISE_M)
     partner, sure = np.full(count, -1, np.int32), np.zeros(count, bool)
+    fixed = np.array(sorted(held or {}), np.int64)
+    places = np.array([(held or {})[int(row)] for row in fixed]).reshape(-1, 3)
+    if len(fixed):
+        expected, sigma = _drifted(side, fixed, places, prior, scale)
     if count == 0 or len(spots) == 0:
         return Matching(partner, sure, expected, sigma)
     certain = known or {}
@@ -116,12 +124,20 @@ def match_spots(
         rows = _consistent(side, spots, partner, sure, prior, set(certain))
         sure[:] = False
         sure[rows] = True
-        if len(rows):
-            drift = spots[partner[rows]] - side.predicted[rows]
-            mean, spread = drift_process(side.coordinates, rows, drift, prior)
-            expected = side.predicted + mean
-            sigma = np.hypot(spread * scale, NOISE_M)
+        free = rows[~np.isin(rows, fixed)]
+        every = np.concatenate([free, fixed])
+        if len(every):
+            goals = np.concatenate([spots[partner[free]], places])
+            expected, sigma = _drifted(side, every, goals, prior, scale)
     return Matching(partner, sure, expected, sigma)
+
+
+def _drifted(
+    side: Side, rows: NDArray[np.int64], goals: FloatArray, prior: float, scale: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Expected places (m, 3) and their spread (m,), given where ``rows`` lie."""
+    mean, spread = drift_process(side.coordinates, rows, goals - side.predicted[rows], prior)
+    return side.predicted + mean, np.hypot(spread * scale, NOISE_M)
 
 
 def mutual_best(cost: FloatArray, margin: float) -> tuple[IntArray, BoolArray]:

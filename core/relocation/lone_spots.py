@@ -101,4 +101,4 @@ def _explained(place: FloatArray, transfer: Transfer, rows: NDArray[np.intp]) ->
 
 
 def _spot(pixel: FloatArray, point_m: FloatArray, confidence: float) -> Spot:
-    return Spot((float(pixel[0]), float(pixel[1])), point_m, confidence)
+    return Spot((float(pixel[0]), float(pixel[1])), point_m, round(confidence, 4))

@@ -153,7 +153,7 @@ class _Matcher:
         side, *_ = self._side()
         pairs = vote_locally(side, self._spots.points_m, self._spots.normals, self.looks)
         voted = set(pairs.values())
-        matching = match_spots(side, self._spots.points_m, self.looks)
+        matching = match_spots(side, self._spots.points_m, self.looks, held=self._certain)
         for row in np.flatnonzero(matching.sure):
             if int(row) not in pairs and int(matching.partner[row]) not in voted:
                 pairs[int(row)] = int(matching.partner[row])
@@ -163,7 +163,7 @@ class _Matcher:
     def match(self) -> tuple[FloatArray, FloatArray, Matching]:
         """The last word: where places were carried, their normals, which spot each one is."""
         side, carried, normals = self._side()
-        matching = match_spots(side, self._spots.points_m, self.looks)
+        matching = match_spots(side, self._spots.points_m, self.looks, held=self._certain)
         if len(carried):
             on_skin = self._surface.nearest_arrays(matching.expected)[2]
             matching = Matching(matching.partner, matching.sure, on_skin, matching.sigma_m)
