@@ -47,7 +47,7 @@ FAR_OFF = 1.5
 """Distances along the skin disagree beyond so many of their own radii."""
 CONFIDENT_M = 0.010
 """`Estimate.confidence` is the probability that the answer is nearer to the truth than this."""
-GEODESIC_SCALE, GEODESIC_LEAST_M = 4.0, 0.030
+GEODESIC_SCALE, GEODESIC_LEAST_M = 4.0, 0.060
 """How much wider than its own posterior a geodesic fix is taken, and its finest spread per axis.
 
 Trilateration errs with its anchors, all lesions of a limb alike, which its posterior does not know;
