@@ -293,11 +293,11 @@ def _length_cost(end: str, length: float) -> float:
 def recorded_skeleton(
     joints_m: dict[str, FloatArray], rig: CameraRig, surface: BodySurface, *, reach_m: float = 0.25
 ) -> Skeleton:
-    """Skeleton from the joints stored with a recording; names outside the 15 are left out.
+    """Skeleton from the joints stored with a recording.
 
-    A joint outside the picture, or farther than ``reach_m`` from the seen body, is not visible.
+    Names outside the 15, and joints without a finite place, are left out. A joint outside the picture, or farther than ``reach_m`` from the seen body, is not visible.
     """
-    names = [name for name in JOINT_NAMES if name in joints_m]
+    names = [name for name in JOINT_NAMES if name in joints_m and np.isfinite(joints_m[name]).all()]
     if not names:
         return Skeleton({}, source="recording")
     points = np.array([joints_m[name] for name in names], dtype=np.float64)

@@ -102,3 +102,8 @@ def test_feet_are_the_surest_and_hands_the_least_sure() -> None:
     assert anchor_sigma_m("left_foot", 1.0) == pytest.approx(0.010)
     assert anchor_sigma_m("right_hand", 1.0) == pytest.approx(0.070)
     assert anchor_sigma_m("left_ear", 1.0) > 0
+
+
+def test_a_recorded_joint_without_a_finite_place_is_left_out(kinect_rig, board):
+    joints = {"head": np.array([0.0, 0.0, 2.0]), "neck": np.array([0.0, np.nan, 2.0])}
+    assert set(recorded_skeleton(joints, kinect_rig, board).joints) == {"head"}
