@@ -295,7 +295,8 @@ def recorded_skeleton(
 ) -> Skeleton:
     """Skeleton from the joints stored with a recording.
 
-    Names outside the 15, and joints without a finite place, are left out. A joint outside the picture, or farther than ``reach_m`` from the seen body, is not visible.
+    Names outside the 15, and joints without a finite place, are left out. A joint outside the picture, or
+    farther than ``reach_m`` from the seen body, is not visible.
     """
     names = [name for name in JOINT_NAMES if name in joints_m and np.isfinite(joints_m[name]).all()]
     if not names:
