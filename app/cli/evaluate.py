@@ -29,13 +29,14 @@ _Value = TypeVar("_Value")
 
 def register(app: typer.Typer) -> None:
     """Add the command group."""
-    from app.cli import evaluate_thesis
+    from app.cli import evaluate_calibrate, evaluate_thesis
 
     group = typer.Typer(help="Measure accuracy.", no_args_is_help=True, pretty_exceptions_enable=False)
     group.callback()(_group)
     group.command("ladder")(ladder)
     group.command("captures")(captures)
     group.command("residuals")(residuals)
+    evaluate_calibrate.register(group)
     evaluate_thesis.register(group)
     app.add_typer(group, name="evaluate")
 
