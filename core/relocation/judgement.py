@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from core.relocation.bones import Bone, Part
 from core.relocation.calibration95 import Kind, factor95
 from core.relocation.pair import VisitPair
-from core.relocation.posterior import radius95_m
+from core.relocation.posterior import radius95_m, skin_region
 from core.relocation.recognition import Recognition
-from core.relocation.sight import Sight, look_at
+from core.relocation.sight import OUTSIDE, TURNED, Sight, look_at
 from core.relocation.spread import (
+    NORMAL_95,
     PIXEL_SHARE,
     SEEN_M,
     Spread,
@@ -34,7 +35,14 @@ AGAIN = 0.85
 SURE, POSSIBLE = 0.5, 0.2
 """Posterior of the best spot from which on it counts as seen again, and of others worth telling."""
 REACH = 3.5
-MOST_RADIUS_M = 0.10
+MOST_RADIUS_M = 0.15
+UNFOLLOWED_M = 0.03
+"""Doubt about skin on an upper limb whose far joint was not found: the surface alone carries it."""
+LEAST_SPOTS, BLIND_COSINE = 12, -0.6
+"""Without so many spots of the follow-up an arm may itself have been carried wrongly.
+
+Its distance from the seen skin then says nothing: only a place that is turned far away counts as hidden.
+Real frames of a clothed man showed it; simulated arms are carried better."""
 TOO_WIDE = "The place is known only to {size:.0f} cm: nothing around it was recognised."
 MOST_OFF_M, MOST_SIGMA_M = 0.006, 0.006
 """A spot counts as seen again only where the skin around it lies on the follow-up's, and matches are near.
@@ -107,9 +115,11 @@ def _judge_one(
     part = body_part(bone)
     seen = _possible_spots(transfer, row)
     partner = int(transfer.matching.partner[row])
-    lost = _not_found(bone) if number in transfer.start.lost else recognition.of_limb(number)
+    unfollowed = number in transfer.start.lost
+    lost = _not_found(bone) if unfollowed and bone.parent != 0 else recognition.of_limb(number)
+    hidden = _hidden(transfer, row, sight, part)
     believed = (
-        not (recognition.doubtful or lost)
+        not (recognition.doubtful or lost or unfollowed)
         and transfer.moles.spot[row] >= 0
         and sight.off_m[row] < MOST_OFF_M
         and transfer.matching.sigma_m[row] < MOST_SIGMA_M
@@ -117,7 +127,7 @@ def _judge_one(
     if believed and len(seen.rows) and seen.rows[0] == partner and seen.probability[0] >= SURE:
         return _seen_again(transfer, row, part, partner, seen, fix)
     if lost:
-        return Estimate(None, hidden=sight.hidden[row], reason=lost)
+        return Estimate(None, hidden=hidden, reason=lost)
     expected = transfer.matching.expected[row]
     on_skin = surface.nearest(expected)[0]
     normal = surface.normal_at(on_skin)
@@ -125,7 +135,7 @@ def _judge_one(
         part,
         transfer.other_stance,
         float(transfer.matching.sigma_m[row]),
-        float(sight.off_m[row]),
+        max(float(sight.off_m[row]), UNFOLLOWED_M if unfollowed else 0.0),
         float(sight.cosine[row]),
         skin_basis(normal, part, bone),
     )
@@ -134,19 +144,44 @@ def _judge_one(
         on_skin = surface.nearest(point)[0]
     kind: Kind = "matched" if len(transfer.spots) else "geometry"
     region, radius = region_of(spread.basis, covariance, factor95(kind, transfer.other_stance, part))
+    if radius > MOST_RADIUS_M and fix is not None and radius95_m(fix) < MOST_RADIUS_M:
+        return _by_geodesics(pair, fix, hidden)
     if radius > MOST_RADIUS_M:
-        return Estimate(None, hidden=sight.hidden[row], reason=TOO_WIDE.format(size=100.0 * radius))
+        return Estimate(None, hidden=hidden, reason=TOO_WIDE.format(size=100.0 * radius))
     return Estimate(
         point_m=on_skin.position_m,
         radius95_m=radius,
         confidence=_within(CONFIDENT_M, covariance) * (DOUBT if recognition.doubtful else 1.0),
         vertex=int(surface.nearest_vertex(on_skin.position_m)[0]),
-        hidden=sight.hidden[row],
+        hidden=hidden,
         candidates=_candidates(transfer, seen, on_skin.position_m, radius),
         region=region,
         reason=reason,
         agreement_m=agreement,
     )
+
+
+def _by_geodesics(pair: VisitPair, fix: Fix, hidden: str) -> Estimate:
+    """The answer of trilateration where the registration carries none."""
+    surface = pair.followup.scan.surface
+    point = surface.nearest(fix.point_m)[0]
+    return Estimate(
+        point_m=point.position_m,
+        radius95_m=radius95_m(fix),
+        confidence=_within(CONFIDENT_M, np.eye(2) * (radius95_m(fix) / NORMAL_95) ** 2),
+        vertex=fix.best_vertex,
+        hidden=hidden,
+        region=skin_region(fix, surface.normals[fix.best_vertex]),
+        reason="Computed from distances along the skin; its shape alone does not carry the place.",
+    )
+
+
+def _hidden(transfer: Transfer, row: int, sight: Sight, part: Part) -> str:
+    """Why the place cannot be in this view; empty when it can."""
+    blind = len(transfer.spots) < LEAST_SPOTS
+    if blind and part in ("upper arm", "forearm") and sight.hidden[row] != OUTSIDE:
+        return TURNED if sight.cosine[row] < BLIND_COSINE else ""
+    return sight.hidden[row]
 
 
 def _seen_again(

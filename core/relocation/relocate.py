@@ -109,7 +109,7 @@ def relocate(
             if pick.point is None
             else _refused(query, obstacle)
             if obstacle
-            else _answer(pair, *estimates[id(query)], skeleton, options)
+            else _answer(pair, *estimates[id(query)], skeleton, options, outcome.sight_judged)
             for query, pick in zip(queries, picks, strict=True)
         )
     progress(1.0, "Done")
@@ -182,6 +182,7 @@ def _answer(
     estimate: Estimate,
     skeleton: tuple[Bone, ...],
     options: RelocationOptions,
+    sight_judged: bool,
 ) -> RelocatedLesion:
     query = lesion.query
     if estimate.point_m is None:
@@ -192,7 +193,7 @@ def _answer(
         hidden = estimate.hidden or turned_away(lesion, skeleton)
         if hidden:
             return RelocatedLesion(query.id, "not_visible", hidden)
-        if estimate.confidence < LEAST_CONFIDENCE:
+        if not sight_judged and estimate.confidence < LEAST_CONFIDENCE:
             return _refused(query, "The anchors disagree about the place.")
     rig = pair.followup.capture.rig
     status: LesionStatus = "predicted"

@@ -79,14 +79,14 @@ def look_at(
         hits = surface.raycast(eye, -way / length[:, None])
         covered |= hits.hit & (hits.t < length - COVERED_M)
     coarse = min(1.0, PIXEL_M * rig.depth.fx / float(np.median(surface.vertices[:, 2])))
-    gone = _logit(cosine, coarse * off, surface, nearest, other_stance) > HIDDEN_LOGIT
+    logit = _logit(cosine, coarse * off, surface, nearest, other_stance)
     hidden = tuple(
         OUTSIDE
         if not inside[k]
         else COVERED
         if covered[k]
         else ""
-        if not gone[k]
+        if logit[k] <= HIDDEN_LOGIT
         else TURNED
         if cosine[k] < TURNED_COSINE
         else BEYOND
