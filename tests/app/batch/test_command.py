@@ -84,7 +84,8 @@ def test_killed_and_asked_to_stop_it_goes_on_where_it_was(cohort: Path, tmp_path
     if process.returncode != 0:  # it may have been done before the signal came
         assert process.returncode == 130
         assert error == "geoderm: stopped; the same command goes on where it stopped\n"
-        assert "left" in told
+        # the signal may come when the last pair is just done
+        assert "left" in told or "2 done" in told
     outcome = geoderm("relocate-batch", manifest, "--out", out, "--workers", 0)
     assert outcome.code == 0
     assert "0 done" not in told

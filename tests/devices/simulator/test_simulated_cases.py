@@ -152,7 +152,8 @@ def test_a_healed_lesion_is_pale_and_its_place_stays(
     assert (after < before).all()
     assert after.min() > -0.2
     rows = [[c.truth.mole_row[n] for n in HEALED] for c in visits]
-    assert np.allclose(one.truth.mole_points_m[rows[0]], two.truth.mole_points_m[rows[1]])
+    assert np.array_equal(one.truth.mole_triangle[rows[0]], two.truth.mole_triangle[rows[1]])
+    assert np.allclose(one.truth.mole_barycentric[rows[0]], two.truth.mole_barycentric[rows[1]])
     write_simulated(two, tmp_path)
     assert read_truth(tmp_path, two.capture.rig).healed_ids == HEALED
 
