@@ -35,7 +35,8 @@ AGAIN = 0.85
 SURE, POSSIBLE = 0.5, 0.2
 """Posterior of the best spot from which on it counts as seen again, and of others worth telling."""
 REACH = 3.5
-MOST_RADIUS_M = 0.15
+MOST_RADIUS_M, BLIND_RADIUS_M = 0.10, 0.15
+"""A place known no better is no answer; where too few moles are there to match, a wider region is one."""
 UNFOLLOWED_M = 0.03
 """Doubt about skin on an upper limb whose far joint was not found: the surface alone carries it."""
 LEAST_SPOTS, BLIND_COSINE = 12, -0.6
@@ -144,9 +145,10 @@ def _judge_one(
         on_skin = surface.nearest(point)[0]
     kind: Kind = "matched" if len(transfer.spots) else "geometry"
     region, radius = region_of(spread.basis, covariance, factor95(kind, transfer.other_stance, part))
-    if radius > MOST_RADIUS_M and fix is not None and radius95_m(fix) < MOST_RADIUS_M:
+    blind = len(transfer.spots) < LEAST_SPOTS
+    if blind and radius > BLIND_RADIUS_M and fix is not None and radius95_m(fix) < BLIND_RADIUS_M:
         return _by_geodesics(pair, fix, hidden)
-    if radius > MOST_RADIUS_M:
+    if radius > (BLIND_RADIUS_M if blind else MOST_RADIUS_M):
         return Estimate(None, hidden=hidden, reason=TOO_WIDE.format(size=100.0 * radius))
     return Estimate(
         point_m=on_skin.position_m,
