@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,15 +44,17 @@ def capture_info(
 def capture_report(analysed: AnalysedCapture) -> dict[str, Any]:
     """What ``capture-info --json`` prints.
 
-    Every joint has its place, its picture pixel (``depth_pixel`` if the capture has no colour) and its
-    visibility.
+    Every joint has its place, its picture pixel (``depth_pixel`` if the capture has no colour; null for a recorded
+    joint behind the camera) and its visibility.
     """
     key = "pixel" if analysed.capture.color is not None else "depth_pixel"
     return {
         "joints": {
             name: {
                 "point_m": [round(float(x), 5) for x in joint.point_m],
-                key: [round(float(x), 2) for x in joint.pixel],
+                key: [round(float(x), 2) for x in joint.pixel]
+                if all(math.isfinite(x) for x in joint.pixel)
+                else None,
                 "visibility": round(joint.visibility, 3),
             }
             for name, joint in analysed.skeleton.joints.items()

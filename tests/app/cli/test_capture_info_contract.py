@@ -94,3 +94,13 @@ def test_a_table_for_people(first: Shot) -> None:
     assert (outcome.code, outcome.err) == (0, "")
     for word in ("front", "psi", "2 frame(s)", "256 x 192", "320 x 240", "left_shoulder", "15 of 15"):
         assert word in outcome.out
+
+
+def test_a_recorded_joint_behind_the_camera_has_no_pixel_and_the_json_no_nan(folder: Path) -> None:
+    description = json.loads((folder / "capture.json").read_text(encoding="utf-8"))
+    description["joints_m"]["left_hand"] = [0.1, 0.2, -1.0]
+    (folder / "capture.json").write_text(json.dumps(description), encoding="utf-8")
+    outcome = geoderm("capture-info", folder, "--json")
+    assert outcome.code == 0
+    assert "NaN" not in outcome.out
+    assert json.loads(outcome.out)["joints"]["left_hand"]["pixel"] is None
