@@ -44,8 +44,8 @@ def capture_info(
 def capture_report(analysed: AnalysedCapture) -> dict[str, Any]:
     """What ``capture-info --json`` prints.
 
-    Every joint has its place, its picture pixel (``depth_pixel`` if the capture has no colour; null for a recorded
-    joint behind the camera) and its visibility.
+    Every joint has its place, its picture pixel (``depth_pixel`` if the capture has no colour; null for a
+    recorded joint behind the camera) and its visibility.
     """
     key = "pixel" if analysed.capture.color is not None else "depth_pixel"
     return {
