@@ -100,7 +100,7 @@ def _of_one_capture(
     file: Path, queries: tuple[LesionQuery, ...], lesion_id: str, captures: dict[str, RgbdCapture]
 ) -> tuple[LesionQuery, ...]:
     """The lesions marked in the same capture as the asked one: its possible confusions. Checked."""
-    from app.cli.relocate import check_pixels
+    from app.batch.one_pair import check_pixels
 
     check_pixels(file, queries, captures)
     own = next(q for q in queries if q.id == lesion_id).capture

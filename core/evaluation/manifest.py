@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,10 @@ from typing import Any
 
 from core.errors import InputError
 from core.relocation import LesionQuery, read_lesions
+from core.relocation.result_json import read_entries
 
 COLUMNS = ("case", "first", "followup", "lesions", "truth")
 MAX_ROWS = 100_000
-MAX_TRUTH_BYTES = 50_000_000
 
 Pixel = tuple[float, float]
 Point = tuple[float, float, float]
@@ -149,17 +148,7 @@ def read_truth(path: Path) -> dict[str, TruePlace]:
     InputError
         Naming the file and the field.
     """
-    try:
-        if path.stat().st_size > MAX_TRUTH_BYTES:
-            raise InputError(f"{path}: the file is too large for a list of lesions.")
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not JSON ({error}).") from error
-    entries = data.get("lesions") if isinstance(data, dict) else None
-    if not isinstance(entries, list):
-        raise InputError(f'{path}: field "lesions" must be a list.')
+    entries = read_entries(path)
     out: dict[str, TruePlace] = {}
     for i, entry in enumerate(entries):
         where = f'{path}: field "lesions[{i}]'

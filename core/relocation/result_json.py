@@ -31,6 +31,24 @@ def read_lesions(path: Path) -> tuple[LesionQuery, ...]:
     InputError
         Naming the file and the field, for anything that is not the format.
     """
+    entries = read_entries(path)
+    queries = tuple(_query(path, i, entry) for i, entry in enumerate(entries))
+    seen: set[str] = set()
+    for i, query in enumerate(queries):
+        if query.id in seen:
+            raise InputError(f'{path}: field "lesions[{i}].id": "{query.id}" occurs twice.')
+        seen.add(query.id)
+    return queries
+
+
+def read_entries(path: Path) -> list[object]:
+    """The list "lesions" of a JSON file.
+
+    Raises
+    ------
+    InputError
+        Naming the file, if it cannot be read, is too large, or holds no such list.
+    """
     try:
         if path.stat().st_size > MAX_LESIONS_BYTES:
             raise InputError(f"{path}: the file is too large for a list of lesions.")
@@ -42,13 +60,7 @@ def read_lesions(path: Path) -> tuple[LesionQuery, ...]:
     entries = data.get("lesions") if isinstance(data, dict) else None
     if not isinstance(entries, list):
         raise InputError(f'{path}: field "lesions" must be a list.')
-    queries = tuple(_query(path, i, entry) for i, entry in enumerate(entries))
-    seen: set[str] = set()
-    for i, query in enumerate(queries):
-        if query.id in seen:
-            raise InputError(f'{path}: field "lesions[{i}].id": "{query.id}" occurs twice.')
-        seen.add(query.id)
-    return queries
+    return entries
 
 
 def _query(path: Path, index: int, entry: object) -> LesionQuery:
