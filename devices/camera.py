@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from core.capture.rgbd import RgbdCapture
 from core.progress import Progress, no_progress
 
-DeviceKind = Literal["simulator", "openni", "recording", "folder"]
+DeviceKind = Literal["simulator", "openni", "realsense", "rig", "recording", "folder"]
 
 DEFAULT_FRAMES = 30
 """Depth frames that are fused into one capture, unless told otherwise."""
@@ -29,7 +29,8 @@ class DeviceInfo:
         ``folder:/path/to/capture``.
     name : str
         For people.
-    kind : {"simulator", "openni", "recording", "folder"}
+    kind : {"simulator", "openni", "realsense", "rig", "recording", "folder"}
+        ``rig`` is a depth camera with an auxiliary colour camera beside it.
     live : bool
         True if the camera sees the present: it can be previewed and asked for any number of frames.
     """

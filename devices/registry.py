@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Protocol, cast
 
+from core.calibration.profile import ProfileStore
 from core.errors import InputError
 from devices.camera import DepthCamera, DeviceInfo
+from devices.live import LiveCamera
 
 
 class CameraFactory(Protocol):
@@ -68,8 +70,14 @@ def list_devices(kind: str | None = None) -> list[DeviceInfo]:
     return [info for k in kinds for info in camera_factory(k).devices()]
 
 
-def open_device(device_id: str) -> DepthCamera:
+def open_device(device_id: str, profiles: ProfileStore | None = None) -> DepthCamera:
     """Return the opened camera with this id (``kind:address``).
+
+    Parameters
+    ----------
+    device_id : str
+    profiles : ProfileStore, optional
+        A live camera uses the newest calibration profile of its serial numbers.
 
     Raises
     ------
@@ -85,6 +93,10 @@ def open_device(device_id: str) -> DepthCamera:
         )
     camera = camera_factory(kind).create(address)
     camera.open()
+    if profiles is not None and isinstance(camera, LiveCamera):
+        profile = profiles.newest(camera.identity.depth_serial, camera.identity.color_serial)
+        if profile is not None:
+            camera.use_profile(profile)
     return camera
 
 

@@ -76,6 +76,10 @@ class Fields:
             raise self.error(name, "must be an object.")
         return Fields(self.path, value, f"{self._prefix}{name}.")
 
+    def as_dict(self) -> dict[str, Any]:
+        """A copy of the object as JSON has it."""
+        return dict(self._values)
+
     def names(self) -> tuple[str, ...]:
         """The field names of this object."""
         return tuple(self._values)

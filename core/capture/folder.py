@@ -74,6 +74,8 @@ def read_capture(folder: Path) -> RgbdCapture:
         taken_at=_read_time(fields),
         mirrored=fields.flag("mirrored", False),
         joints_m=_read_joints(fields),
+        sensor=fields.text("sensor", ""),
+        calibration=fields.object("calibration").as_dict() if fields.has("calibration") else None,
     )
     return unmirror(capture)
 
@@ -305,6 +307,10 @@ def _files(capture: RgbdCapture) -> dict[str, bytes]:
         files["color.png"] = png_bytes(capture.color)
     if capture.joints_m is not None:
         description["joints_m"] = {name: np.asarray(p).tolist() for name, p in capture.joints_m.items()}
+    if capture.sensor:
+        description["sensor"] = capture.sensor
+    if capture.calibration is not None:
+        description["calibration"] = capture.calibration
     files[CAPTURE_FILE] = json.dumps(description, indent=1, ensure_ascii=False).encode("utf-8")
     return files
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,6 +89,11 @@ class RgbdCapture:
         Recorded joints in the depth-camera frame, the subject's own left and right.
     warnings : tuple of str
         What the device knows to be less than it should be, for example a nominal calibration.
+    sensor : str
+        Name of the depth camera's noise model (`core.capture.sensors`); empty if unknown.
+    calibration : dict or None
+        Document of the calibration profile it was taken with (`core.calibration.profile`); its depth
+        correction is already applied to the frames. None for nominal or foreign geometry.
     """
 
     depth_frames: NDArray[np.uint16]
@@ -100,6 +106,8 @@ class RgbdCapture:
     mirrored: bool = False
     joints_m: dict[str, FloatArray] | None = None
     warnings: tuple[str, ...] = ()
+    sensor: str = ""
+    calibration: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         d, cam = self.depth_frames, self.rig.depth

@@ -77,6 +77,10 @@ def encode_capture(capture: RgbdCapture) -> EncodedCapture:
         document["joints_m"] = {
             name: np.asarray(joint, dtype=float).tolist() for name, joint in capture.joints_m.items()
         }
+    if capture.sensor:
+        document["sensor"] = capture.sensor
+    if capture.calibration is not None:
+        document["calibration"] = capture.calibration
     with ThreadPoolExecutor(_THREADS) as pool:
         color = None
         if capture.color is not None:
@@ -125,4 +129,6 @@ def decode_capture(
             taken_at=datetime.fromisoformat(document["taken_at"]),
             mirrored=document["mirrored"],
             joints_m=None if joints is None else {name: np.array(xyz) for name, xyz in joints.items()},
+            sensor=document.get("sensor", ""),
+            calibration=document.get("calibration"),
         )

@@ -1,0 +1,1 @@
+"""Calibration of a rig: boards, intrinsics, extrinsics, depth correction, verdict, daily check."""

@@ -1,0 +1,1 @@
+"""What the capture assistant knows: is this view good enough to capture, and what is to be corrected."""

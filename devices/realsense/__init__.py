@@ -1,0 +1,1 @@
+"""Intel RealSense cameras and their .bag recordings, through the optional library pyrealsense2."""
