@@ -210,9 +210,7 @@ class ProfileStore:
             name = _safe(profile.depth_serial, profile.color_serial)
             while True:
                 numbered = replace(profile, version=version)
-                target = (
-                    self._folder / f"{_safe(profile.depth_serial, profile.color_serial)}-{version:03d}.json"
-                )
+                target = self._folder / f"{name}-{version:03d}.json"
                 if not target.exists():
                     break
                 version += 1
