@@ -13,6 +13,8 @@ from app.cli.stored_pixels import entry_as_stored, mirrored_captures
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
+    from core.calibration.profile import CalibrationProfile
+    from core.capture import RgbdCapture
 
 
 def register(app: typer.Typer) -> None:
@@ -30,15 +32,29 @@ def capture_info(
     from devices.trackers import default_tracker
 
     capture = read_capture(folder)
+    calibration = _calibration(folder, capture)
     analysed = analyse_capture(capture, default_tracker())
     if as_json:
         report = capture_report(analysed)
+        if capture.sensor:
+            report["sensor"] = capture.sensor
+        if calibration is not None:
+            report["calibration"] = calibration.id
         if mirrored_captures(folder, [folder.name]):
             for joint in report["joints"].values():
                 entry_as_stored(joint, capture.rig)
         typer.echo(json.dumps(report, indent=1))
     else:
-        typer.echo(_table(folder, analysed))
+        typer.echo(_table(folder, analysed, calibration))
+
+
+def _calibration(folder: Path, capture: RgbdCapture) -> CalibrationProfile | None:
+    """The profile the capture was taken with; `InputError` that names the file if it is damaged."""
+    if capture.calibration is None:
+        return None
+    from core.calibration.profile import CalibrationProfile
+
+    return CalibrationProfile.from_document(capture.calibration, f"{folder / 'capture.json'}: calibration")
 
 
 def capture_report(analysed: AnalysedCapture) -> dict[str, Any]:
@@ -66,7 +82,13 @@ def capture_report(analysed: AnalysedCapture) -> dict[str, Any]:
     }
 
 
-def _table(folder: Path, analysed: AnalysedCapture) -> str:
+def _calibration_text(profile: CalibrationProfile | None) -> str:
+    if profile is None:
+        return "not stated; the folder's own intrinsics are used"
+    return f"version {profile.version} of {profile.made_at:%Y-%m-%d}, {profile.views} views ({profile.id})"
+
+
+def _table(folder: Path, analysed: AnalysedCapture, calibration: CalibrationProfile | None) -> str:
     capture, skeleton = analysed.capture, analysed.skeleton
     depth = capture.rig.depth
     picture = "none (depth only)"
@@ -84,6 +106,8 @@ def _table(folder: Path, analysed: AnalysedCapture) -> str:
         f"Taken          {capture.taken_at.isoformat(timespec='seconds')}",
         f"Depth          {len(capture.depth_frames)} frame(s) of {depth.width} x {depth.height}",
         f"Colour         {picture}",
+        f"Sensor         {capture.sensor or 'not stated'}",
+        f"Calibration    {_calibration_text(calibration)}",
         f"Body coverage  {100 * analysed.scan.body_coverage:.0f} %",
         f"Depth noise    {1000 * analysed.scan.depth_noise_m:.1f} mm",
         f"Joints         {len(skeleton.visible())} of {len(skeleton.joints)} visible, from the {origin}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from app.cli.main import main
 from core.anchors import JOINT_NAMES
+from core.calibration.profile import CalibrationProfile
 from core.capture import write_capture
 from devices.simulator import SimulatedCapture, SimulatedPatient, make_rig
 
@@ -87,3 +89,24 @@ def test_an_empty_room_is_work_that_could_not_be_done(folder, tmp_path, capfd) -
     said = capfd.readouterr().err
     assert "internal" not in said
     assert len(said.splitlines()) == 1
+
+
+def test_the_sensor_and_the_calibration_it_was_taken_with_are_told(simulated, tmp_path, capfd) -> None:
+    profile = CalibrationProfile(simulated.capture.rig, "S1", "S1", version=3, views=25)
+    taken = replace(simulated.capture, sensor="kinect-v1", calibration=profile.document())
+    write_capture(taken, tmp_path / "calibrated")
+    assert main(["capture-info", str(tmp_path / "calibrated"), "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert (report["sensor"], report["calibration"]) == ("kinect-v1", profile.id)
+    assert main(["capture-info", str(tmp_path / "calibrated")]) == 0
+    assert f"version 3 of {profile.made_at:%Y-%m-%d}, 25 views" in capfd.readouterr().out
+
+
+def test_a_damaged_calibration_is_bad_input_that_names_the_field(simulated, tmp_path, capfd) -> None:
+    document = CalibrationProfile(simulated.capture.rig, "S1").document()
+    document["depth"]["fx"] = "wide"
+    write_capture(replace(simulated.capture, calibration=document), tmp_path / "damaged")
+    assert main(["capture-info", str(tmp_path / "damaged")]) == 2
+    said = capfd.readouterr().err.strip()
+    assert "capture.json: calibration: depth.fx" in said
+    assert "\n" not in said
