@@ -266,14 +266,15 @@ def simulated_wall(seed: int, distance_m: float = 1.6, yaw_deg: float = 12.0) ->
     import numpy as np
 
     from core.capture import CameraRig, RgbdCapture
-    from devices.simulator.sensor import DEPTH_UNIT_M, DepthSensor, FrameMaker, SensorView
+    from core.capture.sensors import sensor_model
+    from devices.simulator.sensor import DEPTH_UNIT_M, FrameMaker, SensorView
 
-    sensor = DepthSensor()
-    camera = sensor.camera
+    sensor = sensor_model("kinect-v1")
+    camera = sensor.depth_camera
     normal = np.array([np.sin(np.deg2rad(yaw_deg)), 0.0, np.cos(np.deg2rad(yaw_deg))])
     rays = camera.pixel_rays
     depth = (distance_m * normal[2] / (rays @ normal)).astype(np.float32)
     cosine = ((rays @ normal) / np.linalg.norm(rays, axis=2)).astype(np.float32)
     view = SensorView(depth, cosine, np.zeros(depth.shape, np.bool_))
     frame = FrameMaker(sensor, view, 0, np.random.default_rng((9, seed))).frame(depth)
-    return RgbdCapture(frame[None], DEPTH_UNIT_M, CameraRig(camera), view="wall")
+    return RgbdCapture(frame[None], DEPTH_UNIT_M, CameraRig(camera), view="wall", sensor=sensor.name)

@@ -86,7 +86,7 @@ class Dropout:
 
 @dataclass(frozen=True)
 class Ripple:
-    """Structured light: a fixed error of the disparity for each device, RMS in pixels of long and short waves."""
+    """Structured light: a fixed disparity error of each device, RMS in pixels of long and short waves."""
 
     long_px: float
     short_px: float

@@ -265,6 +265,7 @@ class SimulatedPatient:
             stance=stance,
             taken_at=taken_at or _FIRST_VISIT + (visit - 1) * _BETWEEN_VISITS,
             joints_m=dict(setup.joints_m) if joints else None,
+            sensor=self.rig.sensor.name,
         )
         progress(1.0, "Captured")
         return SimulatedCapture(capture, truth)
@@ -280,7 +281,7 @@ class SimulatedPatient:
     ) -> PreviewFrame:
         """Small noiseless picture and depth for a viewfinder; the arguments are those of `capture`."""
         setup = self._stand(stance, view, visit, seed, distance_m, turn_deg, None)
-        sensor, color = self.rig.sensor.camera, self.rig.color
+        sensor, color = self.rig.rig.depth, self.rig.color
         cells = setup.stage.body_cells(sensor, RigidTransform())
         room, _ = room_depth(setup.stage, sensor)
         depth = true_depth(setup.stage, sensor, room, cells, RigidTransform())[0][::4, ::4]

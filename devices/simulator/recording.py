@@ -79,7 +79,7 @@ def _sensor_view(
     cells: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float32], SensorView]:
     """True depth (h, w) with the patient at rest, and what the sensor can see of it."""
-    camera = rig.sensor.camera
+    camera = rig.sensor.depth_camera
     depth, hits, pixels = true_depth(stage, camera, room, cells, RigidTransform())
     rays = camera.pixel_rays.reshape(-1, 3)
     normals = np.zeros((len(rays), 3))
@@ -90,12 +90,17 @@ def _sensor_view(
     length = np.maximum(np.linalg.norm(normals, axis=1) * np.linalg.norm(rays, axis=1), 1e-9)
     cosine = np.abs((normals * rays).sum(axis=1)) / length
     flat = depth.ravel().astype(float)
-    seen = np.flatnonzero(np.isfinite(flat))
     shadow = np.zeros(len(rays), bool)
-    projector = np.array([rig.sensor.baseline_m, 0.0, 0.0])
-    shadow[seen] = stage.blocked(projector, rays[seen] * flat[seen, None], _SHADOW_SLACK_M)
+    if rig.sensor.baseline_m > 0:
+        seen = np.flatnonzero(np.isfinite(flat))
+        beside = np.array([rig.sensor.baseline_m, 0.0, 0.0])
+        shadow[seen] = stage.blocked(beside, rays[seen] * flat[seen, None], _SHADOW_SLACK_M)
+    skin = np.zeros(len(rays), bool)
+    skin[pixels[body]] = True
     shape = depth.shape
-    return depth, SensorView(depth, cosine.reshape(shape).astype(np.float32), shadow.reshape(shape))
+    return depth, SensorView(
+        depth, cosine.reshape(shape).astype(np.float32), shadow.reshape(shape), skin.reshape(shape)
+    )
 
 
 def depth_frames(
@@ -106,7 +111,7 @@ def depth_frames(
     progress: Progress,
 ) -> NDArray[np.uint16]:
     """Raw depth frames (n, h, w), one for each motion of the patient."""
-    camera = rig.sensor.camera
+    camera = rig.sensor.depth_camera
     cells = stage.body_cells(camera, RigidTransform())
     room, which = room_depth(stage, camera)
     at_rest, view = _sensor_view(stage, rig, room, which, cells)

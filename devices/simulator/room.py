@@ -6,17 +6,17 @@ under the patient.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig
+from core.capture.sensors import DEFAULT_SENSOR, SensorModel, sensor_model
 from core.capture.transform import RigidTransform
 from core.errors import InputError
 from devices.simulator.body import rotation_about
-from devices.simulator.sensor import DepthSensor
 from devices.simulator.skin import linear
 from devices.simulator.stage import Plane
 
@@ -26,7 +26,6 @@ VIEW_TURN_DEG = {"front": 0.0, "back": 180.0, "left": -90.0, "right": 90.0}
 """Turn of the patient, toward the patient's own left, that shows each side to the camera."""
 
 AUXILIARY_SIZE = (2560, 1920)
-_KINECT_COLOR_SIZE = (640, 480)
 _MILD_DISTORTION = (0.045, -0.09, 0.0006, -0.0004, 0.02)
 
 
@@ -99,14 +98,14 @@ class SimulatedRig:
 
     Attributes
     ----------
-    sensor : DepthSensor
+    sensor : SensorModel
     rig : CameraRig
         Depth and colour camera, as calibrated.
     device_seed : int
         Which device: fixes its ripple and where the colour camera sits.
     """
 
-    sensor: DepthSensor
+    sensor: SensorModel
     rig: CameraRig
     device_seed: int = 0
 
@@ -122,21 +121,32 @@ class SimulatedRig:
 
 
 def make_rig(
-    color_size: tuple[int, int] = AUXILIARY_SIZE, *, distortion: bool = False, device_seed: int = 0
+    color_size: tuple[int, int] = AUXILIARY_SIZE,
+    *,
+    distortion: bool = False,
+    device_seed: int = 0,
+    sensor: str = DEFAULT_SENSOR,
 ) -> SimulatedRig:
-    """Virtual Kinect with its own 640x480 colour camera, or with an auxiliary camera of any other size.
+    """Virtual depth sensor with its own colour camera, or with an auxiliary camera of any other size.
 
-    The Kinect's colour camera sits 25 mm beside the infrared camera, parallel. The auxiliary camera is
-    mounted 25 to 60 mm away and up to about a degree askew, differently for every ``device_seed``.
+    The sensor's own colour camera (``color_size`` is its size: 640 x 480 for a Kinect v1) stands as made,
+    parallel. The auxiliary camera is mounted 25 to 60 mm away and up to about a degree askew, differently
+    for every ``device_seed``.
+
+    Raises
+    ------
+    InputError
+        If there is no such sensor, or the picture is too small.
     """
+    model = sensor_model(sensor)
     width, height = color_size
     if width < 16 or height < 16:
         raise InputError("The simulated colour picture must be at least 16 x 16 pixels.")
     focal = 525.0 * max(width / 640.0, height / 480.0)
     coefficients = _MILD_DISTORTION if distortion else ()
-    if color_size == _KINECT_COLOR_SIZE:
-        color = PinholeCamera(width, height, focal, focal, 319.5, 239.5, coefficients)
-        color_from_depth = RigidTransform(np.eye(3), np.array([-0.025, 0.0, 0.0]))
+    own = model.color_camera
+    if color_size == (own.width, own.height):
+        color, color_from_depth = replace(own, distortion=coefficients), model.color_from_depth
     else:
         rng = np.random.default_rng((0xCA3, device_seed))
         shift = rng.uniform(-0.006, 0.006, 2) * width
@@ -154,8 +164,7 @@ def make_rig(
         axis = rng.normal(size=3)
         rotation = rotation_about(axis, np.deg2rad(rng.uniform(0.3, 1.2)))
         color_from_depth = RigidTransform(rotation, -rotation @ place)
-    sensor = DepthSensor()
-    return SimulatedRig(sensor, CameraRig(sensor.camera, color, color_from_depth), device_seed)
+    return SimulatedRig(model, CameraRig(model.depth_camera, color, color_from_depth), device_seed)
 
 
 @dataclass(frozen=True)

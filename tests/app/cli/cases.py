@@ -8,7 +8,7 @@ import json
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from app.cli.main import main
-from core.capture import CameraRig, PinholeCamera, read_capture
+from core.capture import CameraRig, read_capture
 from devices.simulator import SimulatedRig, make_rig
 
 Json = dict[str, Any]
@@ -68,23 +68,8 @@ _FORBIDDEN = ("Traceback", "internal error", "Error:", "Exception", "<class", "N
 def small_rig() -> SimulatedRig:
     """A Kinect that sees the same with fewer pixels: small, and as precise as the real one."""
     rig = make_rig(COLOR_SIZE)
-    full, share = rig.sensor.camera, DEPTH_SIZE[0] / rig.sensor.camera.width
-    camera = PinholeCamera(
-        *DEPTH_SIZE,
-        full.fx * share,
-        full.fy * share,
-        (full.cx + 0.5) * share - 0.5,
-        (full.cy + 0.5) * share - 0.5,
-    )
-    long, short = rig.sensor.ripple_px
-    sensor = replace(
-        rig.sensor,
-        camera=camera,
-        disparity_step_px=rig.sensor.disparity_step_px * share,
-        lateral_px=rig.sensor.lateral_px * share,
-        ripple_px=(long * share, short * share),
-    )
-    cameras = CameraRig(camera, rig.rig.color, rig.rig.color_from_depth)
+    sensor = rig.sensor.scaled(DEPTH_SIZE[0] / rig.sensor.depth_camera.width)
+    cameras = CameraRig(sensor.depth_camera, rig.rig.color, rig.rig.color_from_depth)
     return SimulatedRig(sensor, cameras, rig.device_seed)
 
 

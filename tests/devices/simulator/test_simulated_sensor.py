@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from devices.simulator.sensor import DEPTH_UNIT_M, DepthSensor, FrameMaker, SensorView, device_ripple
+from core.capture.sensors import sensor_model
+from devices.simulator.sensor import DEPTH_UNIT_M, FrameMaker, SensorView, device_ripple
 
-SENSOR = DepthSensor()
+SENSOR = sensor_model("kinect-v1")
 SHAPE = (480, 640)
 
 
@@ -42,14 +43,14 @@ def test_grazing_surfaces_are_lost() -> None:
 
 def test_depth_values_are_quantised_in_disparity() -> None:
     values = np.unique(_flat_frames(2.3, 2))
-    step = 2.3**2 / (SENSOR.camera.fx * SENSOR.baseline_m) * SENSOR.disparity_step_px
+    step = 2.3**2 / (SENSOR.depth_camera.fx * SENSOR.baseline_m) * SENSOR.disparity_step_px
     assert np.median(np.diff(values[~np.isnan(values)])) == pytest.approx(step, rel=0.15)
 
 
 def test_the_devices_ripple_does_not_average_out() -> None:
     z = 2.3
     error = np.nanmean(_flat_frames(z, 30), axis=0) - z
-    expected = -device_ripple(SENSOR, 0)[8:-8, 8:-8] * z**2 / (SENSOR.camera.fx * SENSOR.baseline_m)
+    expected = -device_ripple(SENSOR, 0)[8:-8, 8:-8] * z**2 / (SENSOR.depth_camera.fx * SENSOR.baseline_m)
     assert np.corrcoef(error.ravel(), expected.ravel())[0, 1] > 0.8
     assert 0.001 < expected.std() < 0.008
 
