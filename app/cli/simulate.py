@@ -26,6 +26,10 @@ def simulate(
     distance: float = typer.Option(2.3, "--distance-m", min=0.8, max=4.0, help="Camera to patient, metres."),
     turn: float = typer.Option(0.0, "--turn-deg", min=-180, max=180, help="Turn of the body, degrees."),
     seed: int = typer.Option(0, help="Seed of the patient's skin and of the noise."),
+    sensor: str = typer.Option(
+        "kinect-v1",
+        help="Depth sensor: kinect-v1, kinect-v2 or realsense-d4xx.",
+    ),
     joints: bool = typer.Option(False, "--joints", help="Store the simulator's own joints in the capture."),
 ) -> None:
     """Write a capture of a simulated patient. The true places of its lesions go into lesions.json."""
@@ -34,9 +38,9 @@ def simulate(
     if not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
         raise InputError(f"{out}: the folder it would be in does not exist or cannot be written.")
     from core.capture import write_capture
-    from devices.simulator import SimulatedPatient
+    from devices.simulator import SimulatedPatient, make_rig
 
-    patient = SimulatedPatient(shape=shape, seed=seed)
+    patient = SimulatedPatient(shape=shape, seed=seed, rig=make_rig(sensor=sensor))
     simulated = patient.capture(
         stance=stance,
         view=view,

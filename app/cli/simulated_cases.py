@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from core.capture.sensors import DEFAULT_SENSOR, sensor_model
 from core.errors import InputError, WorkError
 
 if TYPE_CHECKING:
@@ -54,6 +55,8 @@ class SimulatedCases:
         settings is made again.
     color_size : (width, height)
         Of the auxiliary camera.
+    sensor : str
+        Depth sensor, one of `core.capture.sensors.sensor_names`.
     """
 
     def __init__(
@@ -63,12 +66,15 @@ class SimulatedCases:
         frames: int = FRAMES,
         cache: Path | None = None,
         color_size: tuple[int, int] = COLOR_SIZE,
+        sensor: str = DEFAULT_SENSOR,
     ) -> None:
         if not pairs:
             raise InputError("An evaluation needs at least one pair.")
+        sensor_model(sensor)
         if cache is not None:
             _make_folder(cache)
         self._pairs, self._frames, self._cache, self._size = tuple(pairs), frames, cache, color_size
+        self._sensor = sensor
 
     def __len__(self) -> int:
         return len(self._pairs)
@@ -76,17 +82,23 @@ class SimulatedCases:
     def cases(self) -> Iterator[PendingCase]:
         """All pairs, one at a time."""
         for pair in self._pairs:
-            yield SimulatedCase(pair, self._frames, self._cache, self._size)
+            yield SimulatedCase(pair, self._frames, self._cache, self._size, self._sensor)
 
 
 class SimulatedCase:
     """One pair, rendered or read from the cache when first needed (`core.evaluation.PendingCase`)."""
 
     def __init__(
-        self, pair: SimulatedPair, frames: int, cache: Path | None, color_size: tuple[int, int]
+        self,
+        pair: SimulatedPair,
+        frames: int,
+        cache: Path | None,
+        color_size: tuple[int, int],
+        sensor: str = DEFAULT_SENSOR,
     ) -> None:
-        self._pair, self._frames, self._size = pair, frames, color_size
-        self._folder = None if cache is None else cache / f"{_slug(pair)}-{frames}f"
+        self._pair, self._frames, self._size, self._sensor = pair, frames, color_size, sensor
+        self._slug = _slug(pair) + ("" if sensor == DEFAULT_SENSOR else f"-{sensor}")
+        self._folder = None if cache is None else cache / f"{self._slug}-{frames}f"
 
     @property
     def name(self) -> CaseName:
@@ -94,7 +106,7 @@ class SimulatedCase:
         from core.evaluation import CaseName
 
         pair = self._pair
-        return CaseName(_slug(pair), pair.shape, pair.first, pair.followup)
+        return CaseName(self._slug, pair.shape, pair.first, pair.followup)
 
     def load(self, joints: Joints, frames: int) -> EvaluationCase:
         """Analyse both captures. Truth reaches the analysis only with true joints."""
@@ -119,13 +131,14 @@ class SimulatedCase:
     @cached_property
     def _captures(self) -> tuple[SimulatedCapture, SimulatedCapture]:
         if self._folder is None:
-            return _render(self._pair, self._frames, self._size)
+            return _render(self._pair, self._frames, self._size, self._sensor)
         made_by = json.loads(
             json.dumps(
                 {
                     **asdict(self._pair),
                     "frames": self._frames,
                     "color_size": self._size,
+                    "sensor": sensor_model(self._sensor).fingerprint,
                     "simulator": simulator_code(),
                 }
             )
@@ -133,7 +146,8 @@ class SimulatedCase:
         if _read_done(self._folder) != made_by:
             if self._folder.exists():
                 shutil.rmtree(self._folder)
-            _write(_render(self._pair, self._frames, self._size), self._folder, made_by)
+            made = _render(self._pair, self._frames, self._size, self._sensor)
+            _write(made, self._folder, made_by)
         return _read(self._folder / "first"), _read(self._folder / "followup")
 
     @cached_property
@@ -213,12 +227,12 @@ def some_frames(capture: RgbdCapture, count: int) -> RgbdCapture:
 
 
 def _render(
-    pair: SimulatedPair, frames: int, color_size: tuple[int, int]
+    pair: SimulatedPair, frames: int, color_size: tuple[int, int], sensor: str
 ) -> tuple[SimulatedCapture, SimulatedCapture]:
     from devices.simulator import make_rig
     from devices.simulator.cases import make_pair
 
-    _, first, followup = make_pair(pair, frames, make_rig(color_size))
+    _, first, followup = make_pair(pair, frames, make_rig(color_size, sensor=sensor))
     return first, followup
 
 

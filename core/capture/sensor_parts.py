@@ -6,7 +6,8 @@ All distances are depths along the optical axis in metres.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from hashlib import sha256
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ Principle = Literal["structured-light", "time-of-flight", "stereo"]
 
 _STEEPEST = 1.5
 _NEAREST_M = 0.1
+_WORDS = ("title", "sources", "color_from_depth")
 
 
 @dataclass(frozen=True)
@@ -212,6 +214,13 @@ class SensorModel:
     grain: Grain
     dropout: Dropout
     systematic: Systematic
+
+    @property
+    def fingerprint(self) -> str:
+        """Twelve hexadecimal digits that change with any figure, not with title and sources."""
+        figures = {f.name: repr(getattr(self, f.name)) for f in fields(self) if f.name not in _WORDS}
+        figures["color_from_depth"] = repr(self.color_from_depth.matrix.tolist())
+        return sha256(repr(sorted(figures.items())).encode()).hexdigest()[:12]
 
     def axial_sigma(self, z_m: ArrayLike, incidence_rad: ArrayLike = 0.0) -> Image:
         """Standard deviation of one reading in metres, quantisation included.
