@@ -1,0 +1,172 @@
+"""Where the person stands: distance, and what of the body leaves the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.anchors import LANDMARK_NAMES, VISIBLE, PoseLandmarks
+from core.guidance.moment import Moment
+from core.guidance.person import Person
+from core.guidance.readings import Reading, State, unknown
+
+BoolArray = NDArray[np.bool_]
+
+FRAMED_SHARE: Final = 0.55
+"""A standing person should fill at least this share of the picture's height."""
+
+_EDGE_SHARE: Final = 0.06
+_EDGE_M: Final = 0.025
+_UPRIGHT_M: Final = 1.2
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Distances at which a sensor measures skin, metres.
+
+    Attributes
+    ----------
+    near_m, far_m : float
+        Beyond them it measures nothing, or too little.
+    good_near_m, good_far_m : float
+        Between them it measures well.
+    """
+
+    near_m: float = 0.8
+    good_near_m: float = 1.2
+    good_far_m: float = 3.0
+    far_m: float = 3.6
+
+    @classmethod
+    def of_sensor(cls, near_m: float, far_m: float) -> Reach:
+        """From the range in which a sensor measures at all.
+
+        Errors of triangulating sensors grow with the square of the distance: the farther third of the range
+        is left alone.
+        """
+        return cls(near_m, near_m + 0.3, max(near_m + 0.6, 0.75 * far_m), 0.9 * far_m)
+
+
+def distance_reading(person: Person, moment: Moment, reach: Reach) -> Reading:
+    """Distance of the person, and whether it suits sensor and picture."""
+    z = person.distance_m
+    state: State = "good"
+    say = ""
+    standing = person.high_m[1] - person.low_m[1] > _UPRIGHT_M
+    rows = np.flatnonzero(person.mask.any(axis=1))
+    filled = (rows[-1] - rows[0] + 1) / person.mask.shape[0]
+    if z < reach.near_m or z > reach.far_m:
+        state = "bad"
+    elif not reach.good_near_m <= z <= reach.good_far_m:
+        state = "fair"
+    if z < reach.good_near_m:
+        say = "Step back: you are too near to be measured well."
+    elif z > reach.good_far_m:
+        say = "Come closer: depth gets uncertain so far away."
+    elif standing and filled < FRAMED_SHARE:
+        state, say = "fair", "Come closer: you fill only a part of the picture."
+    return Reading("distance", z, "m", state, say)
+
+
+def cut_sides(person: BoolArray, measured: BoolArray, pixels_per_m: float) -> list[str]:
+    """Edges of the image ("top", "bottom", "left", "right") at which the person leaves it.
+
+    Parameters
+    ----------
+    person, measured : ndarray (h, w) bool
+        Pixels of the person, and all that carry a measurement: the edge is where those end, for depth cameras
+        leave a blind rim.
+    pixels_per_m : float
+        At the person.
+    """
+    sides = []
+    need = max(2, round(_EDGE_M * pixels_per_m))
+    for name, body, seen in (
+        ("top", person, measured),
+        ("bottom", person[::-1], measured[::-1]),
+        ("left", person.T, measured.T),
+        ("right", person.T[::-1], measured.T[::-1]),
+    ):
+        first = int(seen.any(axis=1).argmax())
+        if first <= _EDGE_SHARE * len(seen) and int(body[first].sum()) >= need:
+            sides.append(name)
+    return sides
+
+
+def frame_reading(person: Person, moment: Moment, *, whole_body: bool = True) -> Reading:
+    """Whether the whole body is in the picture, and what is not.
+
+    The value is the number of sides at which it leaves the picture.
+    """
+    pixels_per_m = moment.camera.fx / person.distance_m
+    cut = cut_sides(person.mask, moment.depth_m > 0, pixels_per_m)
+    if not whole_body:
+        cut = [side for side in cut if side != "bottom"]
+    if cut:
+        return Reading("frame", float(len(cut)), "", "bad", _say(cut, moment.pose))
+    hidden = _unseen(moment, whole_body=whole_body)
+    if hidden:
+        return Reading("frame", 0.0, "", "fair", f"Not seen: {hidden}. Step back or tilt the camera.")
+    return Reading("frame", 0.0, "", "good")
+
+
+def faces_camera(pose: PoseLandmarks | None) -> bool | None:
+    """Whether a person faces the camera (front or back view); None from the side or without joints."""
+    if pose is None:
+        return None
+    left, right = (LANDMARK_NAMES.index(f"{side}_shoulder") for side in ("left", "right"))
+    if min(pose.visibility[left], pose.visibility[right]) < VISIBLE:
+        return None
+    across = float(pose.pixels[left, 0] - pose.pixels[right, 0])
+    hips = [LANDMARK_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+    height = abs(float(pose.pixels[hips, 1].mean() - pose.pixels[[left, right], 1].mean()))
+    return None if abs(across) < 0.25 * height else across > 0
+
+
+def _say(cut: list[str], pose: PoseLandmarks | None) -> str:
+    if "top" in cut and "bottom" in cut:
+        return "Step back: head and feet are cut off."
+    if "left" in cut and "right" in cut:
+        return "Step back: both sides of the body are cut off."
+    if "top" in cut:
+        return "Step back or raise the camera: the head is cut off."
+    if "bottom" in cut:
+        return "Step back or lower the camera: the feet are cut off."
+    side = cut[0]
+    facing = faces_camera(pose)
+    if facing is None:
+        return f"Move towards the middle: the body is cut off at the {side} edge of the picture."
+    # the picture is not a mirror: who faces the camera moves to its right edge by stepping to the own left
+    towards = "left" if (side == "left") == facing else "right"
+    return f"Take a step to your {towards}: the body is cut off at the edge of the picture."
+
+
+def _unseen(moment: Moment, *, whole_body: bool) -> str:
+    """Head and feet that the skeleton places outside the picture."""
+    pose = moment.pose
+    if pose is None:
+        return ""
+    camera = moment.rig.picture_camera
+    parts = {"head": ("nose",), "left foot": ("left_ankle",), "right foot": ("right_ankle",)}
+    out = []
+    for said, names in parts.items():
+        if not whole_body and "foot" in said:
+            continue
+        rows = [LANDMARK_NAMES.index(name) for name in names]
+        if not camera.contains(pose.pixels[rows]).all():
+            out.append(said)
+    return " and ".join(out)
+
+
+def nobody(moment: Moment) -> Reading:
+    """What to say if nobody is found: too near, or not there."""
+    h, w = moment.depth_m.shape
+    middle = moment.depth_m[h // 4 : -(h // 4), w // 3 : -(w // 3)]
+    if float((middle <= 0).mean()) > 0.4:
+        return unknown(
+            "distance", "Nothing is measured in the middle: step back, or take away what covers the camera."
+        )
+    return unknown("distance", "Nobody is in view: stand in the middle, 2 to 3 m from the camera.")

@@ -1,0 +1,127 @@
+"""The person in a coarse depth image, within a few milliseconds.
+
+As `core.surface.segmentation` does it for a capture, with two shortcuts: the planes of the room are looked for
+once in a while, for camera and room stand still, and the parts that belong to the patient are chosen by place
+alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.guidance.moment import Moment
+from core.surface.planes import Plane, find_floor, find_walls
+from core.surface.threads import one_linear_algebra_thread
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+ROOM_AGE_S: Final = 5.0
+"""How long the planes of the room are believed."""
+
+_FARTHEST_M: Final = 6.0
+_PERSON_M2: Final = 0.05
+_PERSON_PIXELS: Final = 90
+_REACH_M: Final = 0.25
+_AHEAD_M: Final = 0.95
+_CLOSE_M: Final = 0.16
+_SPECK_PIXELS: Final = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """Somebody in view.
+
+    Attributes
+    ----------
+    mask : ndarray (h, w) bool
+        Coarse pixels measured on the person.
+    missing : ndarray (h, w) bool
+        Pixels within the outline that were not measured.
+    distance_m : float
+        Median depth.
+    low_m, high_m : ndarray (3,)
+        Box around the person in the depth camera's frame.
+    """
+
+    mask: BoolArray
+    missing: BoolArray
+    distance_m: float
+    low_m: FloatArray
+    high_m: FloatArray
+
+
+class PersonFinder:
+    """Finds the person in successive moments of one camera that stands still."""
+
+    def __init__(self) -> None:
+        self._planes: list[Plane] = []
+        self._looked_s = -np.inf
+
+    def find(self, moment: Moment) -> Person | None:
+        """The large, central, near person of a moment, or None if nobody is there."""
+        from core.surface.depth_kernels import label_components, measure_parts
+
+        depth = moment.depth_m
+        inside = (depth > 0) & (depth < _FARTHEST_M)
+        if moment.time_s - self._looked_s > ROOM_AGE_S or moment.time_s < self._looked_s:
+            self._look_at_room(moment, inside)
+        for plane in self._planes:
+            inside &= plane.distances(moment.points) < -plane.tolerance(moment.points)
+        left = np.where(inside, depth, 0.0)
+        # noise is that of single pixels, but neighbours are several apart: a slanted limb must hold together
+        labels, count = label_components(left, np.maximum(0.07, 0.02 * left * left))
+        if count == 0:
+            return None
+        pixels, sums = measure_parts(labels, moment.points, count)
+        area = sums[:, 0] / (moment.camera.fx * moment.camera.fy)
+        center = sums[:, 1:4] / np.maximum(pixels, 1)[:, None]
+        low, high = sums[:, 4:7], sums[:, 7:10]
+        aside = center[:, 0] / np.maximum(center[:, 2], 0.1)
+        score = area * np.exp(-((aside / 0.4) ** 2)) / np.maximum(center[:, 2], 0.3)
+        main = int(score.argmax())
+        if area[main] < _PERSON_M2 or pixels[main] < _PERSON_PIXELS:
+            return None
+        middle = center[main]
+        near = ((center > low[main] - _REACH_M) & (center < high[main] + _REACH_M))[:, :2].all(axis=1)
+        ahead = middle[2] - center[:, 2]
+        belongs = near & (ahead < _AHEAD_M) & (ahead > -0.4) & (area < 0.4 * area[main])
+        belongs &= pixels >= _SPECK_PIXELS
+        belongs[main] = True
+        mask = belongs[labels] & (labels >= 0)
+        z = float(np.median(depth[mask]))
+        return Person(mask, _missing(mask, depth, moment.camera.fx / z), z, low[main], high[main])
+
+    def _look_at_room(self, moment: Moment, inside: BoolArray) -> None:
+        """Find walls and floor again."""
+        points = moment.points[inside][::2]
+        self._looked_s = moment.time_s
+        if len(points) < 500:
+            self._planes = []
+            return
+        camera = moment.camera
+        rows = np.nonzero(inside)[0][::2]
+        with one_linear_algebra_thread():
+            planes = find_walls(points, 2.0 * points[:, 2] ** 2 / (camera.fx * camera.fy))
+            free = np.ones(len(points), np.bool_)
+            for wall in planes:
+                free &= wall.distances(points) < -wall.tolerance(points)
+            floor = find_floor(points[free], rows[free] > 0.5 * camera.height)
+        self._planes = planes if floor is None else [*planes, floor]
+
+
+def _missing(mask: BoolArray, depth: FloatArray, pixels_per_m: float) -> BoolArray:
+    """Unmeasured pixels within the outline: holes, and gaps that a hand's breadth closes."""
+    size = max(3, round(_CLOSE_M * pixels_per_m)) | 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    padded = np.pad(mask.astype(np.uint8), size)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[size:-size, size:-size]
+    gaps = np.asarray((closed > 0) & ~mask & (depth <= 0))
+    # a thin unmeasured line beside the body is the sensor's shadow on the wall, not skin
+    opened = cv2.morphologyEx(gaps.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return np.asarray(opened > 0)
