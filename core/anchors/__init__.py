@@ -4,6 +4,8 @@ from core.anchors.analyse import AnalysedCapture, analyse_capture, with_skeleton
 from core.anchors.calibration import SkeletonCalibration, apply_calibration, calibrate_skeleton
 from core.anchors.finding import find_skeleton
 from core.anchors.left_right import LeftRightReport, Sides, exchange_sides, guard_left_right
+from core.anchors.live import LiveSkeleton, PictureFollower
+from core.anchors.live_pose import LiveJoint, LivePose
 from core.anchors.names import BONES, EXTRA_NAMES, JOINT_NAMES, LANDMARK_NAMES, opposite
 from core.anchors.psi import PsiReport, check_psi
 from core.anchors.relief import shade_depth
@@ -21,6 +23,10 @@ __all__ = [
     "AnchorSet",
     "Joint",
     "LeftRightReport",
+    "LiveJoint",
+    "LivePose",
+    "LiveSkeleton",
+    "PictureFollower",
     "PoseLandmarks",
     "PsiReport",
     "Sides",
