@@ -37,10 +37,10 @@ class FakeWebcam:
         }
         self._pictures: dict[tuple[int, int], NDArray[np.uint8]] = {}
 
-    def isOpened(self) -> bool:  # noqa: N802
+    def isOpened(self) -> bool:
         return self._kind != "absent"
 
-    def getBackendName(self) -> str:  # noqa: N802
+    def getBackendName(self) -> str:
         return "V4L2"
 
     def get(self, prop: int) -> float:
