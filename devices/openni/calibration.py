@@ -1,23 +1,28 @@
 """The rig of a recording or device: from a calibration beside the file, else the sensor's nominal geometry.
 
 OpenNI2 tells only the field of view: no principal point, no distortion, no transform between the cameras.
-``NAME.oni.calibration.json`` beside a recording holds them:
-``{"format": "geoderm-rig/1", "depth": INTRINSICS, "color": INTRINSICS, "color_from_depth": 4x4,
-"picture": FILE}`` with intrinsics as in the capture folder. ``picture`` is an optional still of an auxiliary
-camera that is not an OpenNI2 stream; ``color`` then describes it instead of the colour stream.
+``NAME.oni.calibration.json`` beside a recording holds them: ``{"format": "geoderm-rig/1", "depth": INTRINSICS,
+"color": INTRINSICS, "color_from_depth": 4x4, "picture": FILE, "sensor": NAME, "nominal": BOOL,
+"profile": DOCUMENT, "corrected": BOOL}`` with intrinsics as in the capture folder. ``picture`` is an optional
+still of an auxiliary camera that is not an OpenNI2 stream; ``color`` then describes it instead of the colour
+stream. ``profile`` is the calibration profile that the camera had, and ``corrected`` tells whether its depth
+correction is already in the frames (true unless it says otherwise). ``nominal`` marks a geometry that was never
+calibrated.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.calibration.profile import CalibrationProfile
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
@@ -57,14 +62,37 @@ class _RigFile(BaseModel):
     color: _Intrinsics | None = None
     color_from_depth: list[list[float]] | None = None
     picture: str | None = None
+    sensor: str = ""
+    nominal: bool = False
+    profile: dict[str, Any] | None = None
+    corrected: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RigCalibration:
-    """A rig and, if an auxiliary camera took one, the picture that goes with it."""
+    """What lies beside a recording.
+
+    Attributes
+    ----------
+    rig : CameraRig
+    picture : ndarray (h, w, 3) uint8 or None
+        Of an auxiliary camera, if one took it.
+    sensor : str
+        Name of the noise model; empty if unknown.
+    nominal : bool
+        True if the geometry was never calibrated.
+    profile : CalibrationProfile or None
+        What the camera was calibrated with.
+    corrected : bool
+        Whether the profile's depth correction is already in the frames.
+    """
 
     rig: CameraRig
     picture: NDArray[np.uint8] | None = None
+    sensor: str = ""
+    nominal: bool = False
+    profile: CalibrationProfile | None = None
+    corrected: bool = True
 
 
 def calibration_path(recording: Path) -> Path:
@@ -112,7 +140,15 @@ def read_calibration(recording: Path) -> RigCalibration | None:
         rig = CameraRig(content.depth.camera(), color, transform)
     except (GeodermError, ValueError) as error:
         raise InputError(f"{path}: {error}") from error
-    return RigCalibration(rig, _read_picture(path, content.picture, rig))
+    profile = content.profile
+    return RigCalibration(
+        rig,
+        _read_picture(path, content.picture, rig),
+        content.sensor,
+        content.nominal,
+        None if profile is None else CalibrationProfile.from_document(profile, f"{path}: profile"),
+        content.corrected,
+    )
 
 
 def _read_picture(path: Path, name: str | None, rig: CameraRig) -> NDArray[np.uint8] | None:
@@ -120,6 +156,8 @@ def _read_picture(path: Path, name: str | None, rig: CameraRig) -> NDArray[np.ui
         return None
     if Path(name).name != name:
         raise InputError(f"{path}: picture: must name a file in the same folder.")
+    import cv2
+
     file = path.with_name(name)
     bgr = cv2.imread(str(file), cv2.IMREAD_COLOR)
     if bgr is None:
@@ -130,8 +168,22 @@ def _read_picture(path: Path, name: str | None, rig: CameraRig) -> NDArray[np.ui
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
-def write_calibration(recording: Path, rig: CameraRig, picture: NDArray[np.uint8] | None = None) -> None:
-    """Write the calibration of a recording, and the auxiliary camera's picture, beside it."""
+def write_calibration(
+    recording: Path,
+    rig: CameraRig,
+    picture: NDArray[np.uint8] | None = None,
+    *,
+    sensor: str = "",
+    nominal: bool = False,
+    profile: Mapping[str, Any] | None = None,
+    corrected: bool = True,
+) -> None:
+    """Write the calibration of a recording, and the auxiliary camera's picture, beside it.
+
+    Parameters are those of `RigCalibration`, the profile as its document.
+    """
+    import cv2
+
     name = None
     if picture is not None:
         name = picture_path(recording).name
@@ -142,6 +194,10 @@ def write_calibration(recording: Path, rig: CameraRig, picture: NDArray[np.uint8
         "color": asdict(rig.color) if rig.color else None,
         "color_from_depth": rig.color_from_depth.matrix.tolist() if rig.color_from_depth else None,
         "picture": name,
+        "sensor": sensor,
+        "nominal": nominal,
+        "profile": profile,
+        "corrected": corrected,
     }
     calibration_path(recording).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
@@ -153,6 +209,22 @@ def nominal_rig(depth: StreamInfo, color: StreamInfo | None) -> CameraRig:
         _nominal_camera(color, KINECT_COLOR_FX_AT_640) if color else None,
         KINECT_COLOR_FROM_DEPTH if color else None,
     )
+
+
+def check_profile_sizes(
+    profile: CalibrationProfile, depth_size: tuple[int, int] | None, color_size: tuple[int, int] | None
+) -> None:
+    """Refuse a profile for other image sizes (width, height); None is a stream that does not run."""
+    for name, camera, size in (
+        ("depth", profile.rig.depth, depth_size),
+        ("colour", profile.rig.color, color_size),
+    ):
+        if camera is not None and size is not None and (camera.width, camera.height) != size:
+            raise InputError(
+                f"The calibration is for {camera.width} x {camera.height} {name} pictures, the camera "
+                f"delivers {size[0]} x {size[1]}.",
+                "Choose the mode it was calibrated in, or calibrate this mode.",
+            )
 
 
 def _nominal_camera(stream: StreamInfo, fx_at_640: float) -> PinholeCamera:

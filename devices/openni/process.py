@@ -3,47 +3,63 @@
 from __future__ import annotations
 
 import multiprocessing
+import threading
 import time
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from core.errors import WorkError
+from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 
 ANSWER_TIMEOUT_S = 20.0
-_RESTART = "Unplug and reconnect the camera, then try again."
+_ADVICE = {
+    "camera": "Unplug and reconnect the camera, then try again.",
+    "recording": "The recording may be damaged; choose another.",
+}
 
 
 class RuntimeProcess:
-    """The OpenNI2 runtime in a process of its own, started with the first request.
+    """The OpenNI2 runtime in a process of its own, started with the first request. Any thread may use it.
 
     Parameters
     ----------
-    source : str
-        What messages call the source: "camera" or "recording".
+    source : {"camera", "recording"}
+        What messages call the source.
     """
 
     def __init__(self, source: str = "camera") -> None:
         self._source = source
+        self._lock = threading.RLock()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+        self._busy = False
 
     @property
     def alive(self) -> bool:
         """Whether the process runs."""
-        return self._process is not None and self._process.is_alive()
+        process = self._process
+        try:
+            return process is not None and process.is_alive()
+        except ValueError:  # closed by another thread this moment
+            return False
 
     @property
     def pid(self) -> int | None:
         """Process id, for diagnosis."""
-        return self._process.pid if self._process is not None else None
+        process = self._process
+        return process.pid if process is not None else None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a request is being worked on: no sign of life is due meanwhile."""
+        return self._busy
 
     def request(
         self,
         operation: str,
         *,
-        timeout_s: float = ANSWER_TIMEOUT_S,
+        timeout_s: float | None = None,
         progress: Progress = no_progress,
         **arguments: object,
     ) -> Any:
@@ -52,51 +68,59 @@ class RuntimeProcess:
         Raises
         ------
         WorkError
-            What the runtime complained of; or that it crashed; or that it did not answer for ``timeout_s``.
+            What the runtime complained of; or that it crashed; or that it did not answer for ``timeout_s``
+            (default `ANSWER_TIMEOUT_S`).
+        InputError
+            If the operation refused its arguments.
         Cancelled
             Through ``progress``. The process is stopped: a read in flight cannot be taken back.
         """
-        pipe = self._started()
-        try:
-            pipe.send((operation, arguments))
-            return self._answer(pipe, timeout_s, progress)
-        except (EOFError, BrokenPipeError, ConnectionResetError) as error:
-            self.stop()
-            raise WorkError(
-                f"The OpenNI2 runtime crashed while it was using the {self._source}; what was saved is safe.",
-                _RESTART if self._source == "camera" else "The recording may be damaged; choose another.",
-            ) from error
+        with self._lock:
+            self._busy = True
+            try:
+                pipe = self._started()
+                pipe.send((operation, arguments))
+                answer = self._answer(pipe, ANSWER_TIMEOUT_S if timeout_s is None else timeout_s, progress)
+            except (EOFError, OSError) as error:
+                self.stop()
+                raise self.crashed() from error
+            except BaseException:
+                self.stop()
+                raise
+            finally:
+                self._busy = False
+        if answer[0] == "done":
+            return answer[1]
+        _, kind, message, advice = answer
+        raise (InputError if kind == "input" else WorkError)(message, advice)
 
-    def _answer(self, pipe: Connection, timeout_s: float, progress: Progress) -> Any:
+    def _answer(self, pipe: Connection, timeout_s: float, progress: Progress) -> tuple[Any, ...]:
         deadline = time.monotonic() + timeout_s
-        try:
-            while True:
-                if not pipe.poll(min(0.1, max(deadline - time.monotonic(), 0))):
-                    if time.monotonic() < deadline:
-                        continue
-                    raise WorkError(
-                        f"The {self._source} did not answer for {timeout_s:.0f} seconds.",
-                        _RESTART
-                        if self._source == "camera"
-                        else "The recording may be damaged; choose another.",
-                    )
-                kind, *content = pipe.recv()
-                if kind == "progress":
-                    progress(float(content[0]))
-                    deadline = time.monotonic() + timeout_s
-                elif kind == "error":
-                    raise _Complaint(*content)
-                else:
-                    return content[0]
-        except _Complaint as complaint:
-            raise WorkError(complaint.message, complaint.advice) from None
-        except BaseException:
-            self.stop()
-            raise
+        while not pipe.poll(min(0.1, max(deadline - time.monotonic(), 0.0))):
+            progress(0.0)
+            if time.monotonic() >= deadline:
+                raise self.hung(timeout_s)
+        answer: tuple[Any, ...] = pipe.recv()
+        return answer
+
+    def crashed(self) -> WorkError:
+        """What to tell when the process ended by itself."""
+        return WorkError(
+            f"The OpenNI2 runtime crashed while it was using the {self._source}; what was saved is safe.",
+            _ADVICE[self._source],
+        )
+
+    def hung(self, seconds: float) -> WorkError:
+        """What to tell when the process is there but does nothing."""
+        return WorkError(
+            f"The {self._source} did not answer for {seconds:.0f} seconds.", _ADVICE[self._source]
+        )
 
     def _started(self) -> Connection:
-        if self._pipe is not None and self.alive:
-            return self._pipe
+        if self._pipe is not None:
+            if self.alive:
+                return self._pipe
+            raise EOFError  # it ended since the last request: that is told once, then a new one is started
         self.stop()
         from devices.openni.worker import serve
 
@@ -108,24 +132,18 @@ class RuntimeProcess:
         self._process, self._pipe = process, here
         return here
 
-    def stop(self) -> None:
+    def stop(self, patience_s: float = 1.0) -> None:
         """End the process and wait for it: no zombie stays behind."""
-        if self._pipe is not None:
-            self._pipe.close()
-            self._pipe = None
-        if self._process is not None:
-            self._process.join(1.0)
-            if self._process.is_alive():
-                self._process.kill()
-                self._process.join(5.0)
-            if not self._process.is_alive():
-                self._process.close()
-            self._process = None
-
-
-class _Complaint(Exception):
-    """An error that the runtime's process reported: it is well, the request was not."""
-
-    def __init__(self, message: str, advice: str) -> None:
-        super().__init__(message)
-        self.message, self.advice = message, advice
+        with self._lock:
+            pipe, self._pipe = self._pipe, None
+            process, self._process = self._process, None
+            if pipe is not None:
+                pipe.close()
+            if process is None:
+                return
+            process.join(patience_s)
+            if process.is_alive():
+                process.kill()
+                process.join(5.0)
+            if not process.is_alive():
+                process.close()

@@ -109,6 +109,7 @@ public:
     void stop() override {
         m_feed.obey();
         if (m_running.exchange(false) && m_thread.joinable()) m_thread.join();
+        switched(false);
     }
 
     int getRequiredFrameSize() override { return m_mode.resolutionX * m_mode.resolutionY * pixel_bytes(); }
@@ -140,6 +141,7 @@ private:
     int pixel_bytes() const {
         return m_mode.pixelFormat == ONI_PIXEL_FORMAT_RGB888 ? 3 : m_mode.pixelFormat == ONI_PIXEL_FORMAT_GRAY8 ? 1 : 2;
     }
+    void switched(bool on);
     void run();
     void deliver(uint64_t made_ns, int index);
 
@@ -220,6 +222,7 @@ OniStatus Stream::start() {
     if (exclusive && ((m_kind == ONI_SENSOR_IR && m_device->color_on) || (m_kind == ONI_SENSOR_COLOR && m_device->ir_on)))
         return ONI_STATUS_ERROR;
     if (m_running.exchange(true)) return ONI_STATUS_OK;
+    switched(true);
     m_thread = std::thread([this] { run(); });
     return ONI_STATUS_OK;
 }
@@ -248,9 +251,12 @@ OniStatus Stream::setProperty(int id, const void* data, int size) {
     return ONI_STATUS_OK;
 }
 
+void Stream::switched(bool on) {
+    if (m_kind == ONI_SENSOR_IR) m_device->ir_on = on;
+    if (m_kind == ONI_SENSOR_COLOR) m_device->color_on = on;
+}
+
 void Stream::run() {
-    auto& on = m_kind == ONI_SENSOR_IR ? m_device->ir_on : m_device->color_on;
-    if (m_kind != ONI_SENSOR_DEPTH) on = true;
     const uint64_t period = 1000000000ull / uint64_t(m_mode.fps);
     uint64_t next = now_ns() + period;
     for (int index = 1; m_running; next += period) {
@@ -260,7 +266,6 @@ void Stream::run() {
         deliver(next, index++);
         if (now_ns() > next + 10 * period) next = now_ns();  // the machine was busy: do not catch up in a rush
     }
-    if (m_kind != ONI_SENSOR_DEPTH) on = false;
 }
 
 void Stream::deliver(uint64_t made_ns, int index) {
