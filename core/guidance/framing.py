@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.anchors import LANDMARK_NAMES, VISIBLE, PoseLandmarks
+from core.anchors.live_pose import LivePose
 from core.guidance.moment import Moment
 from core.guidance.person import Person
 from core.guidance.readings import Reading, State, unknown
@@ -113,20 +113,17 @@ def frame_reading(person: Person, moment: Moment, *, whole_body: bool = True) ->
     return Reading("frame", 0.0, "", "good")
 
 
-def faces_camera(pose: PoseLandmarks | None) -> bool | None:
+def faces_camera(pose: LivePose | None) -> bool | None:
     """Whether a person faces the camera (front or back view); None from the side or without joints."""
-    if pose is None:
+    if pose is None or not pose.sees("left_shoulder", "right_shoulder", "neck", "torso"):
         return None
-    left, right = (LANDMARK_NAMES.index(f"{side}_shoulder") for side in ("left", "right"))
-    if min(pose.visibility[left], pose.visibility[right]) < VISIBLE:
-        return None
-    across = float(pose.pixels[left, 0] - pose.pixels[right, 0])
-    hips = [LANDMARK_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-    height = abs(float(pose.pixels[hips, 1].mean() - pose.pixels[[left, right], 1].mean()))
-    return None if abs(across) < 0.25 * height else across > 0
+    at = {name: pose.joints[name].pixel for name in ("left_shoulder", "right_shoulder", "neck", "torso")}
+    across = float(at["left_shoulder"][0] - at["right_shoulder"][0])
+    trunk = abs(float(at["torso"][1] - at["neck"][1]))
+    return None if abs(across) < 0.5 * trunk else across > 0
 
 
-def _say(cut: list[str], pose: PoseLandmarks | None) -> str:
+def _say(cut: list[str], pose: LivePose | None) -> str:
     if "top" in cut and "bottom" in cut:
         return "Step back: head and feet are cut off."
     if "left" in cut and "right" in cut:
@@ -149,14 +146,14 @@ def _unseen(moment: Moment, *, whole_body: bool) -> str:
     pose = moment.pose
     if pose is None:
         return ""
-    camera = moment.rig.picture_camera
-    parts = {"head": ("nose",), "left foot": ("left_ankle",), "right foot": ("right_ankle",)}
+    width, height = pose.size
     out = []
-    for said, names in parts.items():
-        if not whole_body and "foot" in said:
+    for said, name in (("head", "head"), ("left foot", "left_foot"), ("right foot", "right_foot")):
+        joint = pose.joints.get(name)
+        if joint is None or (not whole_body and "foot" in said):
             continue
-        rows = [LANDMARK_NAMES.index(name) for name in names]
-        if not camera.contains(pose.pixels[rows]).all():
+        u, v = joint.pixel
+        if not (-0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5):
             out.append(said)
     return " and ".join(out)
 

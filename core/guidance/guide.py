@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from core.anchors import PoseLandmarks
+from core.anchors.live_pose import LivePose
 from core.capture.rgbd import CameraRig
 from core.guidance.coverage import coverage_reading
 from core.guidance.framing import Reach, distance_reading, frame_reading, nobody
@@ -41,7 +41,7 @@ class LiveGuide:
         depth_unit_m: float,
         rgb: NDArray[np.uint8] | None,
         rig: CameraRig,
-        pose: PoseLandmarks | None = None,
+        pose: LivePose | None = None,
         *,
         psi: bool = False,
         whole_body: bool = True,
@@ -56,8 +56,8 @@ class LiveGuide:
         depth_unit_m : float
         rgb : ndarray (h', w', 3) uint8 or None
         rig : CameraRig
-        pose : PoseLandmarks, optional
-            The newest live landmarks, in pixels of the full picture.
+        pose : LivePose, optional
+            The newest live skeleton, in pixels of the full picture.
         psi : bool
             Whether the psi stance is wanted.
         whole_body : bool

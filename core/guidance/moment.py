@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.anchors import PoseLandmarks
+from core.anchors.live_pose import LivePose
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig
 
@@ -38,7 +38,7 @@ class Moment:
         At most `PICTURE_WIDTH` wide.
     rig : CameraRig
         Of the full images.
-    pose : PoseLandmarks or None
+    pose : LivePose or None
         Of the person, in pixels of the full picture.
     """
 
@@ -47,7 +47,7 @@ class Moment:
     camera: PinholeCamera
     rgb: NDArray[np.uint8] | None
     rig: CameraRig
-    pose: PoseLandmarks | None = None
+    pose: LivePose | None = None
 
     @classmethod
     def of(
@@ -57,11 +57,11 @@ class Moment:
         depth_unit_m: float,
         rgb: NDArray[np.uint8] | None,
         rig: CameraRig,
-        pose: PoseLandmarks | None = None,
+        pose: LivePose | None = None,
     ) -> Moment:
         """Coarse depth and a small picture from the images of a camera."""
         step = max(1, rig.depth.width // COARSE_WIDTH)
-        coarse = depth[step // 2 :: step, step // 2 :: step] * float(depth_unit_m)
+        coarse = depth[step // 2 :: step, step // 2 :: step].astype(np.float64) * depth_unit_m
         return cls(time_s, coarse, coarse_camera(rig.depth, step), _small(rgb), rig, pose)
 
     @property
@@ -109,7 +109,7 @@ class Moment:
 
 @lru_cache(maxsize=8)
 def coarse_camera(camera: PinholeCamera, step: int) -> PinholeCamera:
-    """The camera whose pixels are every ``step``-th of a depth camera's, from the middle of the first ones."""
+    """The camera of every ``step``-th pixel, from the middle of the first ones."""
     first = step // 2
     return PinholeCamera(
         len(range(first, camera.width, step)),

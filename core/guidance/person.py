@@ -1,8 +1,8 @@
 """The person in a coarse depth image, within a few milliseconds.
 
-As `core.surface.segmentation` does it for a capture, with two shortcuts: the planes of the room are looked for
-once in a while, for camera and room stand still, and the parts that belong to the patient are chosen by place
-alone.
+As `core.surface.segmentation` does it for a capture, with two shortcuts: the planes of the room are looked
+for once in a while, for camera and room stand still, and the parts that belong to the patient are chosen by
+place alone.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ _PERSON_PIXELS: Final = 90
 _REACH_M: Final = 0.25
 _AHEAD_M: Final = 0.95
 _CLOSE_M: Final = 0.16
+_THIN_M: Final = 0.03
 _SPECK_PIXELS: Final = 4
 
 
@@ -95,7 +96,7 @@ class PersonFinder:
         belongs[main] = True
         mask = belongs[labels] & (labels >= 0)
         z = float(np.median(depth[mask]))
-        return Person(mask, _missing(mask, depth, moment.camera.fx / z), z, low[main], high[main])
+        return Person(mask, missing_within(mask, depth, moment.camera.fx / z), z, low[main], high[main])
 
     def _look_at_room(self, moment: Moment, inside: BoolArray) -> None:
         """Find walls and floor again."""
@@ -115,13 +116,24 @@ class PersonFinder:
         self._planes = planes if floor is None else [*planes, floor]
 
 
-def _missing(mask: BoolArray, depth: FloatArray, pixels_per_m: float) -> BoolArray:
-    """Unmeasured pixels within the outline: holes, and gaps that a hand's breadth closes."""
+def missing_within(mask: BoolArray, depth: FloatArray, pixels_per_m: float) -> BoolArray:
+    """Unmeasured pixels within the outline: holes, and gaps that a hand's breadth closes.
+
+    Parameters
+    ----------
+    mask : ndarray (h, w) bool
+        The person.
+    depth : ndarray (h, w)
+        0 where there is no measurement.
+    pixels_per_m : float
+        At the person.
+    """
     size = max(3, round(_CLOSE_M * pixels_per_m)) | 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     padded = np.pad(mask.astype(np.uint8), size)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, kernel)[size:-size, size:-size]
     gaps = np.asarray((closed > 0) & ~mask & (depth <= 0))
     # a thin unmeasured line beside the body is the sensor's shadow on the wall, not skin
-    opened = cv2.morphologyEx(gaps.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    thin = max(3, round(_THIN_M * pixels_per_m))
+    opened = cv2.morphologyEx(gaps.astype(np.uint8), cv2.MORPH_OPEN, np.ones((thin, thin), np.uint8))
     return np.asarray(opened > 0)

@@ -1,10 +1,10 @@
 """How blurred a picture is, in pixels, from the width of its edges.
 
 An edge of contrast C that is blurred with a Gaussian of standard deviation s has a largest slope of
-C / (s sqrt(2 pi)). Blurring the picture once more with a known s0 makes that C / (sqrt(s^2 + s0^2) sqrt(2 pi)):
-the ratio R of both slopes gives s = s0 / sqrt(R^2 - 1), whatever the contrast (Zhuo and Sim, Pattern
-Recognition 44, 2011). Motion blurs along its direction only, so both directions are measured and the worse
-one counts.
+C / (s sqrt(2 pi)). Blurring the picture once more with a known s0 makes that C / (sqrt(s^2 + s0^2)
+sqrt(2 pi)): the ratio R of both slopes gives s = s0 / sqrt(R^2 - 1), whatever the contrast (Zhuo and Sim,
+Pattern Recognition 44, 2011). Motion blurs along its direction only, so both directions are measured and the
+worse one counts.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from core.guidance.readings import Reading, unknown
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-SHARP_PX: Final = 1.5
-BLURRED_PX: Final = 2.6
+SHARP_PX: Final = 1.4
+BLURRED_PX: Final = 2.2
 """Standard deviations of the blur, in pixels of a picture 640 wide."""
 
 _AGAIN_PX: Final = 1.2

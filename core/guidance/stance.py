@@ -1,7 +1,7 @@
 """What to correct of the stance, from live joints: the psi check of the calibration at preview rate.
 
-The joints are lifted to space by the depth under them, plainly: no surface is built. That is enough for advice
-to a person; the capture is checked with the full method.
+The joints are lifted to space by the depth under them, plainly: no surface is built. That is enough for
+advice to a person; the capture is checked with the full method.
 """
 
 from __future__ import annotations
@@ -11,58 +11,33 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from core.anchors import LANDMARK_NAMES, Joint, PoseLandmarks, Skeleton, check_psi
+from core.anchors import EXTRA_NAMES, JOINT_NAMES, Joint, Skeleton, check_psi
 from core.guidance.moment import Moment
 from core.guidance.person import Person
 from core.guidance.readings import Reading, unknown
 
 FloatArray = NDArray[np.float64]
 
-_JOINTS: Final[dict[str, tuple[str, ...]]] = {
-    "head": ("left_ear", "right_ear"),
-    "neck": ("left_shoulder", "right_shoulder"),
-    "torso": ("left_shoulder", "right_shoulder", "left_hip", "right_hip"),
-    **{
-        f"{side}_{joint}": tuple(f"{side}_{mark}" for mark in marks)
-        for side in ("left", "right")
-        for joint, marks in (
-            ("shoulder", ("shoulder",)),
-            ("elbow", ("elbow",)),
-            ("hand", ("wrist", "index")),
-            ("hip", ("hip",)),
-            ("knee", ("knee",)),
-            ("foot", ("ankle",)),
-        )
-    },
-}
 _PATCH: Final = 2
 
 
 def live_skeleton(moment: Moment, person: Person) -> Skeleton | None:
-    """Joints in space from the live landmarks and the coarse depth; None without landmarks."""
+    """Joints in space: as the live skeleton lifted them, else by the coarse depth; None without one."""
     pose = moment.pose
     if pose is None:
         return None
     depth = np.where(person.mask, moment.depth_m, 0.0)
-    inside = moment.rig.picture_camera.contains(pose.pixels)
-    joints = {}
-    for name, marks in _JOINTS.items():
-        rows = [LANDMARK_NAMES.index(mark) for mark in marks]
-        pixel = pose.pixels[rows].mean(axis=0)
-        seen = float(pose.visibility[rows].min()) if inside[rows].all() else 0.0
-        point = _lift(pixel, depth, moment, person.distance_m)
-        joints[name] = Joint(name, point, pixel, seen, "color")
-    nose = LANDMARK_NAMES.index("nose")
-    landmarks = {
-        "nose": Joint(
-            "nose",
-            _lift(pose.pixels[nose], depth, moment, person.distance_m),
-            pose.pixels[nose],
-            float(pose.visibility[nose]),
-            "color",
-        )
-    }
-    return Skeleton(joints, landmarks)
+    found = {}
+    for name, seen in pose.joints.items():
+        if name in JOINT_NAMES or name in EXTRA_NAMES:
+            point = seen.point_m
+            if point is None:
+                point = _lift(seen.pixel, depth, moment, person.distance_m)
+            found[name] = Joint(name, point, seen.pixel, seen.visibility, pose.source)
+    return Skeleton(
+        {name: joint for name, joint in found.items() if name in JOINT_NAMES},
+        {name: joint for name, joint in found.items() if name in EXTRA_NAMES},
+    )
 
 
 def stance_reading(moment: Moment, person: Person | None, *, whole_body: bool = True) -> Reading:

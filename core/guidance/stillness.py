@@ -1,18 +1,18 @@
 """The stillness meter: how far any part of the body has moved within the last second, in millimetres.
 
 Across the line of sight, corners of the picture on the body are followed (Lucas-Kanade); along it, the coarse
-depth is compared. Both are taken as averages over parts of the body, so that the sensor's noise, which changes
-every pixel of every frame, averages out, while an arm that moves alone is still noticed: the part that moved
-most is the answer. The present is compared with several moments of the last second; a to and fro is not missed.
-Depth is averaged over three successive moments first, and of what is left only as much counts as noise of the
-measured spread does not explain.
+depth is compared. Both are taken as averages over parts of the body, so that the sensor's noise, which
+changes every pixel of every frame, averages out, while an arm that moves alone is still noticed: the part
+that moved most is the answer. The present is compared with several moments of the last second; a to and fro
+is not missed. Depth is averaged over three successive moments first, and of what is left only as much counts
+as noise of the measured spread does not explain.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, cast
 
 import cv2
 import numpy as np
@@ -47,7 +47,10 @@ _POINTS: Final = 90
 _FEWEST: Final = 4
 _FEWEST_DEPTH: Final = 40
 _JUMP_M: Final = 0.08
-_FLOW = {
+_BODY_M: Final = 0.8
+_OUTLINE_PX: Final = 1.2
+_OUTLINE_SLOPE: Final = 0.05
+_FLOW: Final[dict[str, Any]] = {
     "winSize": (17, 17),
     "maxLevel": 2,
     "criteria": (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01),
@@ -62,7 +65,8 @@ class _Look:
     person: BoolArray
     inner: BoolArray
     mm_per_px: float
-    """At the person, in pixels of `grey`, or of the depth without it."""
+    depth_mm_per_px: float
+    """At the person, in pixels of `grey` and of the depth."""
 
 
 class StillnessMeter:
@@ -121,13 +125,14 @@ def _unlike(one: _Look, other: _Look) -> bool:
 def _look(moment: Moment, person: Person) -> _Look:
     inner = cv2.erode(person.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     grey, focal = None, moment.camera.fx
+    far_mm = 1000.0 * person.distance_m
     if moment.grey is not None:
         share = min(1.0, _WIDTH / moment.grey.shape[1])
         size = (round(moment.grey.shape[1] * share), round(moment.grey.shape[0] * share))
         grey = np.asarray(cv2.resize(moment.grey, size, interpolation=cv2.INTER_AREA), np.uint8)
         focal = moment.picture_focal * share
-    scale = 1000.0 * person.distance_m / focal
-    return _Look(moment.time_s, grey, moment.depth_m, person.mask, np.asarray(inner), scale)
+    scales = far_mm / focal, far_mm / moment.camera.fx
+    return _Look(moment.time_s, grey, moment.depth_m, person.mask, np.asarray(inner), *scales)
 
 
 def _mark(look: _Look, moment: Moment, person: Person) -> NDArray[np.float32]:
@@ -159,8 +164,8 @@ def _across_mm(then: _Look, now: _Look, marked: NDArray[np.float32], person: Boo
     moved = np.zeros(_ROWS * _COLUMNS)
     if len(marked) < _FEWEST or then.grey is None or now.grey is None:
         return moved
-    to, found, _ = cv2.calcOpticalFlowPyrLK(now.grey, then.grey, marked, None, **_FLOW)
-    back, again, _ = cv2.calcOpticalFlowPyrLK(then.grey, now.grey, to, None, **_FLOW)
+    to, found, _ = cv2.calcOpticalFlowPyrLK(now.grey, then.grey, marked, cast(Any, None), **_FLOW)
+    back, again, _ = cv2.calcOpticalFlowPyrLK(then.grey, now.grey, to, cast(Any, None), **_FLOW)
     faithful = (found[:, 0] > 0) & (again[:, 0] > 0)
     faithful &= np.linalg.norm((back - marked)[:, 0], axis=1) < 0.3
     at, shift = marked[faithful, 0].astype(float), (to - marked)[faithful, 0].astype(float)
@@ -174,24 +179,35 @@ def _across_mm(then: _Look, now: _Look, marked: NDArray[np.float32], person: Boo
 
 
 def _outline_mm(then: list[_Look], now: list[_Look], person: BoolArray) -> FloatArray:
-    """Sideways movement of every band of the body, from the middle of its outline: there is no picture."""
-    moved = np.zeros((_ROWS, _COLUMNS))
-    rows = np.flatnonzero(person.any(axis=1))
-    columns = np.arange(person.shape[1])
-    for k, band in enumerate(np.array_split(rows, _ROWS)):
-        if len(band) < _FEWEST:
+    """Movement of every part of the outline, where there is no picture.
+
+    The step of Lucas and Kanade on the averaged outlines: every edge counts where it is, so that a hand that
+    flickers in and out of view does not shift the arm beside it.
+    """
+    moved = np.zeros(_ROWS * _COLUMNS)
+    one, other = (
+        cv2.GaussianBlur(np.mean([look.person for look in looks], axis=0), (0, 0), _OUTLINE_PX)
+        for looks in (then, now)
+    )
+    down, right = np.gradient(0.5 * (one + other))
+    change = other - one
+    around = cv2.dilate(person.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    rows, columns = np.nonzero(around & (np.hypot(down, right) > _OUTLINE_SLOPE))
+    cell = _cells(rows / person.shape[0], columns / person.shape[1], person)
+    for k in range(len(moved)):
+        at = rows[cell == k], columns[cell == k]
+        if len(at[0]) < _FEWEST_DEPTH:
             continue
-        middles = []
-        for looks in (then, now):
-            weight = np.mean([look.person[band] for look in looks], axis=0)
-            total = weight.sum(axis=1)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                middles.append((weight @ columns) / total)
-        shift = middles[1] - middles[0]
-        shift = shift[np.isfinite(shift)]
-        if len(shift) >= _FEWEST:
-            moved[k] = _beyond_noise(float(shift.mean()), float(shift.std()), len(shift)) * now[-1].mm_per_px
-    return moved.ravel()
+        slopes = np.stack([right[at], down[at]], axis=1)
+        normal = slopes.T @ slopes
+        normal += 0.02 * np.trace(normal) * np.eye(2)
+        shift = -np.linalg.solve(normal, slopes.T @ change[at])
+        left = change[at] + slopes @ shift
+        # the smoothing has made neighbours alike: as many pixels as its window has area count as one
+        alike = 2.0 * np.sqrt(np.pi) * _OUTLINE_PX
+        noise = _NOISE_SIGMAS * alike * float(left.std()) * np.sqrt(np.trace(np.linalg.inv(normal)))
+        moved[k] = np.sqrt(max(float(shift @ shift) - noise**2, 0.0)) * then[0].depth_mm_per_px
+    return moved
 
 
 def _along_mm(then: list[_Look], now: list[_Look], person: BoolArray) -> FloatArray:
@@ -219,3 +235,38 @@ def _beyond_noise(mean: float, spread: float, count: int) -> float:
     """What of a mean of noisy values is more than the noise of the mean."""
     noise = _NOISE_SIGMAS * spread / np.sqrt(count)
     return float(np.sqrt(max(mean**2 - noise**2, 0.0)))
+
+
+def burst_motion_mm(
+    depth_frames: NDArray[np.uint16], unit_m: float, person: BoolArray, pixels_per_m: float
+) -> float | None:
+    """Movement from the beginning to the end of a burst; None if it is too short to tell.
+
+    Parameters
+    ----------
+    depth_frames : ndarray (n, h, w) uint16
+        Coarse: about `moment.COARSE_WIDTH` wide.
+    unit_m : float
+    person : ndarray (h, w) bool
+        In the fused frames.
+    pixels_per_m : float
+        At the person.
+    """
+    if len(depth_frames) < 3 * _AVERAGED:
+        return None
+    depth = depth_frames * unit_m
+    middle = float(np.median(depth[len(depth) // 2][person]))
+    wide = cv2.dilate(person.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    kernel = np.ones((3, 3), np.uint8)
+    looks = []
+    for k, frame in enumerate(depth):
+        on = np.asarray(wide & (frame > 0) & (np.abs(frame - middle) < _BODY_M))
+        inner = np.asarray(cv2.erode(on.astype(np.uint8), kernel) > 0)
+        looks.append(_Look(float(k), None, frame, on, inner, 0.0, 1000.0 / pixels_per_m))
+    third = len(looks) // 3
+    parts = [looks[:third], looks[third : 2 * third], looks[2 * third :]]
+    moved = [
+        np.hypot(_outline_mm(then, now, person), _along_mm(then, now, person)).max()
+        for then, now in ((parts[0], parts[1]), (parts[1], parts[2]), (parts[0], parts[2]))
+    ]
+    return float(max(moved))
