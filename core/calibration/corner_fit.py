@@ -123,7 +123,11 @@ def _inside(gray: NDArray[np.uint8], spec: BoardSpec, mapped: _Map) -> NDArray[n
     plane, h = spec.corners_m[:, :2], 0.3 * spec.square_m
     around = np.stack([mapped(plane + np.array(s) * h) for s in ((-1, -1), (1, -1), (1, 1), (-1, 1))], axis=1)
     limit = np.array(gray.shape[::-1]) - 2
-    return np.flatnonzero(((around >= 1) & (around <= limit)).all(axis=(1, 2))).astype(np.int64)
+    inside = ((around >= 1) & (around <= limit)).all(axis=(1, 2))
+    a, b = around[:, 2] - around[:, 0], around[:, 3] - around[:, 1]
+    # Squares seen edge on, or by a map gone wrong, tell nothing.
+    area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    return np.flatnonzero(inside & (area > 4.0)).astype(np.int64)
 
 
 def _registered(
