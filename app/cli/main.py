@@ -26,6 +26,8 @@ COMMAND_MODULES = (
     "app.cli.records",
     "app.cli.evaluate",
     "app.cli.devices",
+    "app.cli.record",
+    "app.cli.play",
 )
 """Each has ``register(app)``. Their heavy imports happen inside the commands."""
 

@@ -1,13 +1,13 @@
 """The rig of a recording or device: from a calibration beside the file, else the sensor's nominal geometry.
 
 OpenNI2 tells only the field of view: no principal point, no distortion, no transform between the cameras.
-``NAME.oni.calibration.json`` beside a recording holds them: ``{"format": "geoderm-rig/1", "depth": INTRINSICS,
-"color": INTRINSICS, "color_from_depth": 4x4, "picture": FILE, "sensor": NAME, "nominal": BOOL,
-"profile": DOCUMENT, "corrected": BOOL}`` with intrinsics as in the capture folder. ``picture`` is an optional
-still of an auxiliary camera that is not an OpenNI2 stream; ``color`` then describes it instead of the colour
-stream. ``profile`` is the calibration profile that the camera had, and ``corrected`` tells whether its depth
-correction is already in the frames (true unless it says otherwise). ``nominal`` marks a geometry that was never
-calibrated.
+``NAME.oni.calibration.json`` beside a recording holds them: ``{"format": "geoderm-rig/1",
+"depth": INTRINSICS, "color": INTRINSICS, "color_from_depth": 4x4, "picture": FILE, "sensor": NAME,
+"nominal": BOOL, "profile": DOCUMENT, "corrected": BOOL}`` with intrinsics as in the capture folder.
+``picture`` is an optional still of an auxiliary camera that is not an OpenNI2 stream; ``color`` then
+describes it instead of the colour stream. ``profile`` is the calibration profile that the camera had, and
+``corrected`` tells whether its depth correction is already in the frames (true unless it says otherwise).
+``nominal`` marks a geometry that was never calibrated.
 """
 
 from __future__ import annotations

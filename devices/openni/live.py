@@ -345,7 +345,8 @@ class OpenNICamera:
         else:
             return
         self._let_go(failure)
-        self._runtime.stop(patience_s=0.2)
+        # A healthy process completes a recording that was going on.
+        self._runtime.stop(patience_s=3.0 if unplugged else 0.2)
         raise failure
 
     def capture(self, frames: int = DEFAULT_FRAMES, progress: Progress = no_progress) -> RgbdCapture:

@@ -1,4 +1,4 @@
-"""A recording in the place of a camera: played in real time, again and again, for viewfinders and training."""
+"""A recording in the place of a camera: played in real time, again and again."""
 
 from __future__ import annotations
 

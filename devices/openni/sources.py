@@ -1,9 +1,9 @@
 """Recordings of every form as a row of frames: ``.oni`` files, capture folders, sequences of capture folders.
 
 A sequence is a folder of capture folders with a ``sequence.json`` beside them:
-``{"format": "geoderm-sequence/1", "captures": [{"folder": NAME, "times_s": [...], "color_time_s": S}, ...]}``,
-times from the beginning of the recording. A folder of capture folders without it, and a single capture folder,
-play at the nominal rate.
+``{"format": "geoderm-sequence/1", "nominal": BOOL, "captures": [{"folder": NAME, "times_s": [...],
+"color_time_s": S}, ...]}``, times from the beginning of the recording. A folder of capture folders without
+it, and a single capture folder, play at the nominal rate.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import threading
 from multiprocessing import connection
 from multiprocessing.connection import Connection
@@ -26,6 +27,8 @@ def serve(pipe: Connection) -> None:
 
     The runtime's own shutdown crashes in some builds when streams were open; nothing is left to lose here.
     """
+    # Ctrl-C in a terminal reaches every process; what it means is the application's business.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _bound_memory()
     threading.Thread(target=_leave_with_parent, name="parent-watch", daemon=True).start()
     session = Session()
@@ -36,7 +39,7 @@ def serve(pipe: Connection) -> None:
             elif session.streaming:
                 session.pump(_PUMP_S)
             session.beat()
-    except (EOFError, OSError, KeyboardInterrupt):
+    except (EOFError, OSError):
         with contextlib.suppress(Exception):
             session.stop_recording()  # what was recorded until now becomes a complete file
     finally:
