@@ -100,7 +100,7 @@ def open_device(device_id: str, profiles: ProfileStore | None = None) -> DepthCa
     return camera
 
 
-register_camera("simulator", "devices.simulator.camera_device:SIMULATED_CAMERAS")
+register_camera("simulator", "devices.simulator.live_address:SIMULATED_CAMERAS")
 register_camera("openni", "devices.openni.cameras:CONNECTED_CAMERAS")
 register_camera("recording", "devices.openni.cameras:RECORDINGS")
 register_camera("folder", "devices.folders:FOLDERS")

@@ -1,27 +1,46 @@
-"""The simulated patient as a depth camera: what the demonstration and the tests of the windows open."""
+"""The simulated patient as a live depth camera: what training, the demonstration and the tests open."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
-from urllib.parse import parse_qsl
+from typing import TYPE_CHECKING, Any, Self
+from uuid import uuid4
 
+import cv2
 import numpy as np
 
-from core.capture.rgbd import RgbdCapture
+from core.calibration.profile import CalibrationProfile
+from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
-from devices.camera import DEFAULT_FRAMES, DepthCamera, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.live import (
+    DEFAULT_STREAMS,
+    CameraControl,
+    CameraIdentity,
+    LiveFrame,
+    LiveState,
+    StreamKind,
+    StreamMode,
+)
+from devices.simulator.live_faults import NO_FAULTS, Faults
+from devices.simulator.live_light import LONGEST_S, SHORTEST_S, LightControl
+from devices.simulator.live_sway import SWAYS, Sway
 from devices.simulator.shapes import SHAPES, describe_shape
 
 if TYPE_CHECKING:
+    from devices.simulator.live_scene import LiveScene
+    from devices.simulator.live_stream import PatientStream
     from devices.simulator.patient import SimulatedPatient
+    from devices.simulator.room import SimulatedRig
     from devices.simulator.truth import SimulatedCapture
 
 _PREVIEW_WIDTH = 320
+_FPS = 30
 
 
 @dataclass(frozen=True)
@@ -37,7 +56,12 @@ class SimulatedScene:
 
 
 class SimulatedCamera:
-    """A virtual Kinect with a simulated patient in front of it.
+    """A virtual depth camera with a simulated patient in front of it: a `devices.live.LiveCamera`.
+
+    The viewfinder's picture is that of the colour camera reduced to 640 pixels, and `rig` is the geometry of
+    what `latest` shows; captures have the full picture and bring their own rig. The drawing is done by
+    another process from the first look on, so that neither the viewfinder nor a capture holds up a window;
+    a camera that only takes captures draws in its own process. Both draw the same.
 
     Parameters
     ----------
@@ -46,6 +70,12 @@ class SimulatedCamera:
     scene : SimulatedScene
     seed : int
         Of the patient, when only a shape is given.
+    sway : {"still", "calm", "restless"}
+        How the patient stands.
+    light : float
+        Of the room, 1 for a well-lit one.
+    faults : Faults
+        What goes wrong, counted from the first frame after each opening.
     """
 
     def __init__(
@@ -53,19 +83,36 @@ class SimulatedCamera:
         patient: SimulatedPatient | str = "m_young_avg",
         scene: SimulatedScene | None = None,
         seed: int = 0,
+        *,
+        sway: Sway = "calm",
+        light: float = 1.0,
+        faults: Faults = NO_FAULTS,
     ) -> None:
         self._shape = patient if isinstance(patient, str) else patient.shape
         if self._shape not in SHAPES:
             raise InputError(
                 f"There is no simulated body called '{self._shape}'.", f"Choose one of: {', '.join(SHAPES)}."
             )
-        self._patient = None if isinstance(patient, str) else patient
+        if sway not in SWAYS:
+            raise InputError(f"A simulated patient cannot stand '{sway}'.", f"Choose {', '.join(SWAYS)}.")
+        if not light > 0:
+            raise InputError("The light of a simulated room must be above 0.")
+        self._own = None if isinstance(patient, str) else patient
+        self._patient = self._own
         self._seed = seed if isinstance(patient, str) else patient.seed
+        self._token = f"{self._shape}-{self._seed}" if isinstance(patient, str) else uuid4().hex
         self._scene = scene or SimulatedScene()
-        self._preview: PreviewFrame | None = None
-        self._ticks = np.random.default_rng(self._seed)
+        self._sway, self._faults = sway, faults
+        self._light = LightControl(light)
+        self._simulated_rig: SimulatedRig | None = None
+        self._live_rig: CameraRig | None = None
+        self._profile: CalibrationProfile | None = None
+        self._stream: PatientStream | None = None
+        self._stream_turn = threading.Lock()
         self._last: SimulatedCapture | None = None
         self._opened = False
+
+    # --- who and how ------------------------------------------------------------------------------------
 
     @property
     def info(self) -> DeviceInfo:
@@ -79,21 +126,47 @@ class SimulatedCamera:
         )
 
     @property
+    def identity(self) -> CameraIdentity:
+        """Serial numbers made of shape and seed; the colour camera is a separate one."""
+        serial = f"SIM-{self._shape}-{self._seed}"
+        sensor = getattr(self._virtual_rig.sensor, "name", "kinect-v1")
+        return CameraIdentity("Simulated depth camera", serial, f"{serial}-AUX", str(sensor))
+
+    @property
     def scene(self) -> SimulatedScene:
-        """How the patient stands now."""
+        """How the patient stands, or is about to."""
         return self._scene
 
     @scene.setter
     def scene(self, scene: SimulatedScene) -> None:
         if scene != self._scene:
-            self._scene, self._preview = scene, None
+            self._scene = scene
+            if self._stream is not None:
+                self._stream.stand(scene)
 
     def stand(self, stance: str | None = None, view: str | None = None, visit: int | None = None) -> None:
-        """Ask the patient to change stance, side or visit; None leaves it as it is."""
+        """Ask the patient to change stance, side or visit; None leaves it as it is.
+
+        The viewfinder follows within a second or two, in which the patient is seen to move.
+        """
         now = self._scene
         self.scene = replace(
             now, stance=stance or now.stance, view=view or now.view, visit=visit or now.visit
         )
+
+    def step(self, distance_m: float | None = None, turn_deg: float | None = None) -> None:
+        """Ask the patient to come nearer, step back or turn; None leaves it as it is."""
+        now = self._scene
+        self.scene = replace(
+            now,
+            distance_m=now.distance_m if distance_m is None else distance_m,
+            turn_deg=now.turn_deg if turn_deg is None else turn_deg,
+        )
+
+    @property
+    def changing(self) -> bool:
+        """Whether the viewfinder still shows an earlier stance than `scene`."""
+        return self._stream is not None and self._stream.changing
 
     @property
     def patient(self) -> SimulatedPatient:
@@ -104,8 +177,11 @@ class SimulatedCamera:
         WorkError
             If the camera is closed.
         """
-        if not self._opened or self._patient is None:
-            raise WorkError("The simulated camera is closed.", "Open it first.")
+        self._check_open()
+        if self._patient is None:
+            from devices.simulator.patient import SimulatedPatient
+
+            self._patient = SimulatedPatient(self._shape, self._seed)
         return self._patient
 
     @property
@@ -113,48 +189,211 @@ class SimulatedCamera:
         """The last capture with its truth, for tests and evaluations."""
         return self._last
 
+    @property
+    def _virtual_rig(self) -> SimulatedRig:
+        if self._simulated_rig is None:
+            from devices.simulator.room import make_rig
+
+            self._simulated_rig = make_rig() if self._own is None else self._own.rig
+        return self._simulated_rig
+
+    @property
+    def rig(self) -> CameraRig:
+        """Geometry of the frames of `latest`: the profile's, or the true one."""
+        if self._live_rig is None:
+            from devices.simulator.live_geometry import live_rig_of
+
+            self._live_rig = live_rig_of(
+                self._virtual_rig.rig if self._profile is None else self._profile.rig
+            )
+        return self._live_rig
+
+    @property
+    def profile(self) -> CalibrationProfile | None:
+        """The calibration in use; None for the true geometry."""
+        return self._profile
+
+    def use_profile(self, profile: CalibrationProfile | None) -> None:
+        """Use a calibration, made of the viewfinder's pictures or of the captures'."""
+        if profile is not None:
+            from devices.simulator.live_calibration import check_profile
+
+            check_profile(profile, self.identity, self._virtual_rig.rig)
+        self._profile, self._live_rig = profile, None
+
+    # --- the present ------------------------------------------------------------------------------------
+
     def open(self) -> None:
-        """Bring the patient in."""
-        if self._patient is None:
-            from devices.simulator.patient import SimulatedPatient
-
-            self._patient = SimulatedPatient(self._shape, self._seed)
+        """Bring the patient in. Nothing is drawn before somebody looks or takes a capture."""
         self._opened = True
-
-    def capture(self, frames: int = DEFAULT_FRAMES, progress: Progress = no_progress) -> RgbdCapture:
-        """Depth frames and a colour picture of the patient as the `scene` says."""
-        s = self._scene
-        self._last = self.patient.capture(
-            s.stance,
-            s.view,
-            s.visit,
-            frames,
-            s.seed,
-            s.distance_m,
-            s.turn_deg,
-            taken_at=datetime.now(UTC),
-            progress=progress,
-        )
-        return self._last.capture
-
-    def preview(self) -> PreviewFrame | None:
-        """Return a small frame; only the noise changes until the scene does."""
-        if not self._opened:
-            return None
-        if self._preview is None:
-            s = self._scene
-            self._preview = self.patient.preview(s.stance, s.view, s.visit, s.seed, s.distance_m, s.turn_deg)
-        still = self._preview
-        if still.rgb is None or still.depth_m is None:
-            return still
-        rgb = still.rgb.astype(np.float32) + self._ticks.normal(0.0, 3.0, still.rgb.shape).astype(np.float32)
-        grain = self._ticks.normal(0.0, 0.004, still.depth_m.shape).astype(np.float32)
-        depth = np.where(still.depth_m > 0, still.depth_m + grain * still.depth_m, np.float32(0))
-        return PreviewFrame(depth, np.clip(rgb, 0, 255).astype(np.uint8))
 
     def close(self) -> None:
         """Send the patient out; who it is stays."""
         self._opened = False
+        with self._stream_turn:
+            stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.close()
+
+    @property
+    def state(self) -> LiveState:
+        """How the camera is now."""
+        if not self._opened:
+            return LiveState.CLOSED
+        stream = self._stream
+        return LiveState.STREAMING if stream is None else stream.state
+
+    def start(self, streams: Collection[StreamKind] = DEFAULT_STREAMS) -> None:
+        """Stream these kinds from now on, counted from frame 1."""
+        if "infrared" in streams:
+            raise WorkError("The simulated patient is not filmed in infrared.", "Choose depth and colour.")
+        if not streams:
+            raise WorkError("A camera needs at least one stream.")
+        self._look(streams).restart(streams)
+
+    def _check_open(self) -> None:
+        if not self._opened:
+            raise WorkError("The simulated camera is closed.", "Open it first.")
+
+    def _look(self, streams: Collection[StreamKind] = DEFAULT_STREAMS) -> PatientStream:
+        self._check_open()
+        with self._stream_turn:
+            if self._stream is None:
+                from devices.simulator.live_stream import PatientStream
+                from devices.simulator.live_sway import StandingPerson
+                from devices.simulator.room import Variation
+
+                natural = Variation() if self._own is None else self._own.variation
+                share = SWAYS[self._sway]
+                sway_m, breath_m = share * natural.sway_m, min(share, 1.0) * natural.breath_m
+                self._stream = PatientStream(
+                    self._draw,
+                    self._scene,
+                    lambda stature_m: StandingPerson(sway_m, breath_m, stature_m, self._seed),
+                    self._seed,
+                    streams,
+                    self._faults,
+                )
+                self._stream.light(self._light)
+            return self._stream
+
+    def latest(self, after: int = 0, timeout_s: float = 0.0) -> LiveFrame | None:
+        """The newest frame if its number is greater than ``after``, see `devices.live.LiveCamera`.
+
+        The first one is there two to five seconds after the first look: the patient has to be drawn.
+        """
+        return self._look().latest(after, timeout_s)
+
+    def preview(self) -> PreviewFrame | None:
+        """Return the newest frame made small, None while the camera is closed or has none yet."""
+        if not self._opened:
+            return None
+        frame = self.latest()
+        if frame is None or frame.depth is None or frame.rgb is None:
+            return None
+        depth = frame.depth[::2, ::2].astype(np.float32) * np.float32(frame.depth_unit_m)
+        height = round(frame.rgb.shape[0] * _PREVIEW_WIDTH / frame.rgb.shape[1])
+        rgb = cv2.resize(frame.rgb, (_PREVIEW_WIDTH, height), interpolation=cv2.INTER_AREA)
+        return PreviewFrame(depth, np.asarray(rgb, np.uint8))
+
+    def modes(self) -> tuple[StreamMode, ...]:
+        """One mode for each stream."""
+        depth, color = self.rig.depth, self.rig.picture_camera
+        return (
+            StreamMode("depth", depth.width, depth.height, _FPS, "depth_1_mm"),
+            StreamMode("color", color.width, color.height, _FPS, "rgb888"),
+        )
+
+    def choose_mode(self, mode: StreamMode) -> None:
+        """Accept the mode that is in force."""
+        if mode not in self.modes():
+            raise InputError("The simulated camera has no such mode.", "Choose one of those it offers.")
+
+    def controls(self) -> tuple[CameraControl, ...]:
+        """Exposure of the colour camera."""
+        light = self._light
+        return (
+            CameraControl("auto_exposure", float(light.automatic)),
+            CameraControl("exposure_s", light.exposure_in_force_s, SHORTEST_S, LONGEST_S),
+        )
+
+    def set_control(self, name: str, value: float) -> None:
+        """Set a control; an exposure chosen by hand ends the automatic one."""
+        control = next((c for c in self.controls() if c.name == name), None)
+        if control is None:
+            raise InputError(f"The simulated camera has no control '{name}'.")
+        if not control.minimum <= value <= control.maximum:
+            raise InputError(f"{name} goes from {control.minimum:g} to {control.maximum:g}.")
+        if name == "auto_exposure":
+            now = self._light.exposure_in_force_s
+            self._light = replace(self._light, automatic=bool(value), exposure_s=now)
+        else:
+            self._light = replace(self._light, automatic=False, exposure_s=value)
+        if self._stream is not None:
+            self._stream.light(self._light)
+
+    # --- captures ---------------------------------------------------------------------------------------
+
+    def capture(self, frames: int = DEFAULT_FRAMES, progress: Progress = no_progress) -> RgbdCapture:
+        """Depth frames and a colour picture in full size of the patient as the `scene` says."""
+        self._check_open()
+        stream = self._stream
+
+        def report(fraction: float, message: str = "") -> None:
+            if stream is not None:
+                stream.check()
+                if stream.state is LiveState.STALLED:
+                    raise WorkError(
+                        "The simulated camera has stopped delivering frames.",
+                        "Unplug and reconnect it, then try again.",
+                    )
+            progress(fraction, message)
+
+        report(0.0)
+        scene, sway, now = self._scene, SWAYS[self._sway], datetime.now(UTC)
+        if stream is None:
+            from devices.simulator.live_scene import take_capture
+
+            taken = take_capture(self.patient, scene, sway, frames, now, report)
+        else:
+            taken = self._ask("capture", progress=report, scene=scene, sway=sway, frames=frames, taken_at=now)
+        self._last = replace(taken, capture=self._finished(taken.capture))
+        return self._last.capture
+
+    def _finished(self, capture: RgbdCapture) -> RgbdCapture:
+        """The capture as this camera's exposure and calibration make it."""
+        color, table = capture.color, self._light.table
+        if table is not None and color is not None:
+            color = np.asarray(cv2.LUT(color, table), np.uint8)
+        capture = replace(capture, sensor=capture.sensor or self.identity.sensor, color=color)
+        if self._profile is None:
+            return capture
+        from devices.simulator.live_calibration import calibrated
+
+        return calibrated(capture, self._profile)
+
+    def _draw(self, scene: SimulatedScene, stop: Callable[[], bool]) -> LiveScene:
+        drawn: LiveScene = self._ask("pose", scene=scene, stop=stop)
+        return drawn
+
+    def _ask(
+        self,
+        operation: str,
+        *,
+        progress: Progress = no_progress,
+        stop: Callable[[], bool] = lambda: False,
+        **arguments: object,
+    ) -> Any:
+        """Let the drawing process do something with this patient, who is sent there if he is not yet."""
+        from devices.simulator.live_parcel import pack_patient
+        from devices.simulator.live_process import DRAWING
+
+        if not DRAWING.request("has", token=self._token, stop=stop):
+            parcel = None if self._own is None else pack_patient(self._own)
+            DRAWING.request(
+                "admit", token=self._token, shape=self._shape, seed=self._seed, parcel=parcel, stop=stop
+            )
+        return DRAWING.request(operation, token=self._token, progress=progress, stop=stop, **arguments)
 
     def __enter__(self) -> Self:
         self.open()
@@ -167,44 +406,3 @@ class SimulatedCamera:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
-
-
-class _SimulatedCameras:
-    """Factory for ``simulator:SHAPE``, with options as in ``simulator:m_young_avg?seed=3&stance=A&visit=2``.
-
-    Options: seed, and stance, view, visit, turn_deg, distance_m of the `SimulatedScene`.
-    """
-
-    def devices(self) -> Sequence[DeviceInfo]:
-        """One camera per body shape."""
-        return [SimulatedCamera(shape).info for shape in SHAPES]
-
-    def create(self, address: str) -> DepthCamera:
-        """Return the camera of a shape, not opened yet."""
-        shape, _, options = address.partition("?")
-        scene, seed = SimulatedScene(), 0
-        for name, text in parse_qsl(options, keep_blank_values=True):
-            try:
-                if name == "seed":
-                    seed = int(text)
-                elif name == "stance":
-                    scene = replace(scene, stance=text)
-                elif name == "view":
-                    scene = replace(scene, view=text)
-                elif name == "visit":
-                    scene = replace(scene, visit=int(text))
-                elif name == "turn_deg":
-                    scene = replace(scene, turn_deg=float(text))
-                elif name == "distance_m":
-                    scene = replace(scene, distance_m=float(text))
-                else:
-                    raise InputError(
-                        f"A simulated camera has no option '{name}'.",
-                        "It has seed, stance, view, visit, turn_deg and distance_m.",
-                    )
-            except ValueError as error:
-                raise InputError(f"'{text}' is not a number for '{name}' of a simulated camera.") from error
-        return SimulatedCamera(shape, scene, seed)
-
-
-SIMULATED_CAMERAS = _SimulatedCameras()
