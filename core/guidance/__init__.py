@@ -2,6 +2,7 @@
 
 from core.guidance.faults import FAULTS, Fault, label_of
 from core.guidance.framing import Reach
+from core.guidance.ghost import Ghost
 from core.guidance.guide import LiveGuide
 from core.guidance.readings import READING_NAMES, Guidance, Reading, State
 from core.guidance.verdict import CaptureQuality, Finding, Grade, judge_capture
@@ -12,6 +13,7 @@ __all__ = [
     "CaptureQuality",
     "Fault",
     "Finding",
+    "Ghost",
     "Grade",
     "Guidance",
     "LiveGuide",

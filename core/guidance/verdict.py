@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 Grade = Literal["good", "usable", "refused"]
 
-COVERED: Final = 0.93
+COVERED: Final = 0.97
 LEAST_COVERED: Final = 0.5
 """Share of the body with depth: below the first a doubt, below the second no basis for measuring."""
 
