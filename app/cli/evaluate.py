@@ -29,7 +29,7 @@ _Value = TypeVar("_Value")
 
 def register(app: typer.Typer) -> None:
     """Add the command group."""
-    from app.cli import evaluate_calibrate, evaluate_thesis
+    from app.cli import evaluate_calibrate, evaluate_sensors, evaluate_thesis
 
     group = typer.Typer(help="Measure accuracy.", no_args_is_help=True, pretty_exceptions_enable=False)
     group.callback()(_group)
@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
     group.command("captures")(captures)
     group.command("residuals")(residuals)
     evaluate_calibrate.register(group)
+    evaluate_sensors.register(group)
     evaluate_thesis.register(group)
     app.add_typer(group, name="evaluate")
 
@@ -61,6 +62,7 @@ _DELTA = typer.Option(
     None, "--delta-m", help="Half width of a voting band in metres. Default: 0.03 (docs/method.md)."
 )
 _SEED = typer.Option(0, min=0, help="Seed of methods and bootstrap.")
+_SENSOR = typer.Option("kinect-v1", "--sensor", help="Depth sensor of the simulated captures.")
 _KEEP = typer.Option(
     False, "--keep", help="Take over measurements of an earlier version of the program as well."
 )
@@ -77,6 +79,7 @@ def ladder(
     out: Path | None = _OUT,
     delta_m: float | None = _DELTA,
     seed: int = _SEED,
+    sensor: str = _SENSOR,
     keep: bool = _KEEP,
 ) -> None:
     """Measure methods on simulated pairs of visits.
@@ -85,11 +88,11 @@ def ladder(
     """
     from app.cli.simulated_cases import simulator_code
 
-    rungs = _rungs(methods, joints, frames, appearance)
+    rungs = chosen_rungs(methods, joints, frames, appearance)
     chosen = simulated_pairs(split)[: pairs or None]
-    source = _simulated(chosen, rungs, cache)
+    source = _simulated(chosen, rungs, cache, sensor)
     about = {
-        "captures": f"simulated, {split} split, "
+        "captures": f"simulated, {sensor}, {split} split, "
         f"{len(chosen)} pairs of {len({p.shape for p in chosen})} bodies"
     }
     _run(source, rungs, about, out, _options(delta_m), seed, keep, simulator_code())
@@ -117,7 +120,7 @@ def captures(
     from app.cli.captured_cases import CapturedCases
     from core.evaluation.manifest import read_manifest
 
-    rungs = _rungs(methods, joints, frames, appearance)
+    rungs = chosen_rungs(methods, joints, frames, appearance)
     pairs = read_manifest(manifest)
     about = {"captures": f"{manifest.name}, {len(pairs)} pairs of {len({p.body for p in pairs})} bodies"}
     _run(CapturedCases(pairs), rungs, about, out, _options(delta_m), seed, keep)
@@ -144,7 +147,7 @@ def residuals(
 
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
-    rungs = _rungs(methods, joints, frames, appearance)
+    rungs = chosen_rungs(methods, joints, frames, appearance)
     source = _simulated(simulated_pairs(split)[: pairs or None], rungs, cache)
     code = f"{measured_code()} {simulator_code()} seed {seed}"
     journal = _journal(out.with_suffix(".jsonl"), code, keep)
@@ -168,16 +171,18 @@ def simulated_pairs(split: str) -> tuple[SimulatedPair, ...]:
     return tuple(splits[split])
 
 
-def _simulated(pairs: Sequence[SimulatedPair], rungs: Sequence[Rung], cache: Path | None) -> CaseSource:
+def _simulated(
+    pairs: Sequence[SimulatedPair], rungs: Sequence[Rung], cache: Path | None, sensor: str = "kinect-v1"
+) -> CaseSource:
     from app.cli.simulated_cases import FRAMES, SimulatedCases
 
     most = max(rung.frames for rung in rungs)
     if most > FRAMES:
         raise InputError(f"--frames: simulated captures have {FRAMES} depth frames, not {most}.")
-    return SimulatedCases(pairs, cache=cache)
+    return SimulatedCases(pairs, cache=cache, sensor=sensor)
 
 
-def _rungs(methods: str, joints: str, frames: str, appearance: str) -> tuple[Rung, ...]:
+def chosen_rungs(methods: str, joints: str, frames: str, appearance: str) -> tuple[Rung, ...]:
     """What is to be measured, from the options."""
     from core.evaluation import check_methods, ladder_methods, ladder_rungs
 

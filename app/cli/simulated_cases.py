@@ -112,7 +112,7 @@ class SimulatedCase:
         """Analyse both captures. Truth reaches the analysis only with true joints."""
         from core.evaluation import EvaluationCase
 
-        one, two = self._captures
+        one, two = self.captures
         start = time.perf_counter()
         first, followup = (_analysed(c, joints, frames) for c in (one, two))
         seconds = time.perf_counter() - start
@@ -129,7 +129,8 @@ class SimulatedCase:
         )
 
     @cached_property
-    def _captures(self) -> tuple[SimulatedCapture, SimulatedCapture]:
+    def captures(self) -> tuple[SimulatedCapture, SimulatedCapture]:
+        """First visit and follow-up, with their truth."""
         if self._folder is None:
             return _render(self._pair, self._frames, self._size, self._sensor)
         made_by = json.loads(
@@ -158,7 +159,7 @@ class SimulatedCase:
         """
         from core.evaluation import TrueLesion
 
-        one, two = (capture.truth for capture in self._captures)
+        one, two = (capture.truth for capture in self.captures)
         rng = np.random.default_rng(self._pair.seed)
         out = []
         for i, name in enumerate(one.mole_ids):

@@ -19,6 +19,7 @@ from core.capture.sensor_parts import (
     Principle,
     Ripple,
     SensorModel,
+    Smoothing,
     Systematic,
     Tilt,
 )
@@ -167,6 +168,13 @@ _KIND_OF: dict[Principle, str] = {
 }
 
 
+class _Smoothing(_Strict):
+    window_px: Annotated[float, Field(gt=0, le=8, allow_inf_nan=False)]
+    gate_m: Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)]
+    gate_sigmas: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = 0.0
+    trim_px: Annotated[int, Field(ge=0, le=5)] = 0
+
+
 class _Document(_Strict):
     format: Literal["geoderm-sensor/1"]
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
@@ -185,6 +193,7 @@ class _Document(_Strict):
     grain: _Grain
     dropout: _Dropout
     systematic: Annotated[_Ripple | _Phase | _Matching, Field(discriminator="kind")]
+    smoothing: _Smoothing
 
     @model_validator(mode="after")
     def _consistent(self) -> _Document:
@@ -225,4 +234,5 @@ class _Document(_Strict):
             grain=Grain(self.grain.white, self.grain.correlated, self.grain.window_px),
             dropout=Dropout(**self.dropout.model_dump()),
             systematic=self.systematic.part(),
+            smoothing=Smoothing(**self.smoothing.model_dump()),
         )

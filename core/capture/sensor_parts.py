@@ -87,14 +87,36 @@ class Dropout:
 
 
 @dataclass(frozen=True)
+class Smoothing:
+    """How the fused depth is smoothed before it becomes skin (`core.surface.denoise`).
+
+    Attributes
+    ----------
+    window_px : float
+        Standard deviation of the window, in depth pixels.
+    gate_m : float
+        Neighbours that differ by more belong to something else; at least so much.
+    gate_sigmas : float
+        The same in standard deviations of the fused depth; 0: `gate_m` alone.
+    trim_px : int
+        The outermost pixels of a body are left out: they measured what stands before, not what is there.
+    """
+
+    window_px: float = 1.5
+    gate_m: float = 0.020
+    gate_sigmas: float = 0.0
+    trim_px: int = 0
+
+
+@dataclass(frozen=True)
 class Ripple:
     """Structured light: a fixed disparity error of each device, RMS in pixels of long and short waves."""
 
     long_px: float
     short_px: float
 
-    def sigma(self, z_m: ArrayLike, sensor: SensorModel) -> NDArray[np.float64]:
-        """RMS in metres at depth z, one value for each."""
+    def sigma(self, z_m: ArrayLike, sensor: SensorModel, smoothed_px: float = 0.0) -> NDArray[np.float64]:
+        """RMS in metres at depth z; smoothing takes nothing off."""
         pixels = np.hypot(self.long_px, self.short_px * np.sqrt(1.25))  # bands: half as strong as short waves
         return np.asarray(pixels * sensor.metres_per_disparity(z_m), float)
 
@@ -124,8 +146,8 @@ class PhaseError:
     corner_m: float
     flying: float
 
-    def sigma(self, z_m: ArrayLike, sensor: SensorModel) -> NDArray[np.float64]:
-        """RMS in metres at depth z."""
+    def sigma(self, z_m: ArrayLike, sensor: SensorModel, smoothed_px: float = 0.0) -> NDArray[np.float64]:
+        """RMS in metres at depth z; smoothing takes nothing off."""
         rms = np.sqrt(0.5 * self.wiggle_m**2 + self.pattern_m**2 + self.offset_m**2)
         return np.full(np.shape(np.asarray(z_m)), float(rms))
 
@@ -155,9 +177,14 @@ class MatchingError:
     texture: float
     fatten_px: float
 
-    def sigma(self, z_m: ArrayLike, sensor: SensorModel) -> NDArray[np.float64]:
-        """RMS in metres at depth z."""
-        pixels = np.hypot(self.frozen_px, self.long_px)
+    def sigma(self, z_m: ArrayLike, sensor: SensorModel, smoothed_px: float = 0.0) -> NDArray[np.float64]:
+        """RMS in metres at depth z, before or after smoothing with a Gaussian of so many pixels.
+
+        White noise behind a Gaussian of width a has a spread of 1 / a, and behind another one of width b
+        1 / sqrt(a^2 + b^2).
+        """
+        left = self.window_px / np.hypot(self.window_px, smoothed_px)
+        pixels = np.hypot(left * self.frozen_px, self.long_px)
         return np.asarray(pixels * sensor.metres_per_disparity(z_m), float)
 
 
@@ -195,6 +222,7 @@ class SensorModel:
     dropout : Dropout
     systematic : Ripple, PhaseError or MatchingError
         What stays the same in all frames of a capture.
+    smoothing : Smoothing
     """
 
     name: str
@@ -214,6 +242,7 @@ class SensorModel:
     grain: Grain
     dropout: Dropout
     systematic: Systematic
+    smoothing: Smoothing = Smoothing()
 
     @property
     def fingerprint(self) -> str:
@@ -271,6 +300,22 @@ class SensorModel:
     def systematic_sigma(self, z_m: ArrayLike) -> NDArray[np.float64]:
         """RMS in metres of the error that all frames of a capture share, at depth z."""
         return self.systematic.sigma(z_m, self)
+
+    def fused_sigma(self, z_m: ArrayLike, frames: int) -> NDArray[np.float64]:
+        """Standard deviation in metres of the mean of many frames at depth z, skin square to the camera."""
+        return np.asarray(
+            np.hypot(self.axial_sigma(z_m) / np.sqrt(max(frames, 1)), self.systematic_sigma(z_m))
+        )
+
+    def skin_sigma(self, z_m: ArrayLike, frames: int) -> NDArray[np.float64]:
+        """Standard deviation in metres of the smoothed skin along the line of sight, at depth z.
+
+        Smoothing takes off what varies within its window: all but a little of the noise between frames,
+        and that part of the systematic error that is no wider than the window.
+        """
+        window = self.smoothing.window_px
+        random = self.axial_sigma(z_m) / np.sqrt(max(frames, 1)) / (2.0 * np.sqrt(np.pi) * max(window, 0.5))
+        return np.asarray(np.hypot(random, self.systematic.sigma(z_m, self, window)))
 
     def scaled(self, share: float) -> SensorModel:
         """A sensor as precise as this one, with ``share`` of its pixels in width and in height."""

@@ -20,6 +20,7 @@ from core.capture.sensor_parts import (
     Principle,
     Ripple,
     SensorModel,
+    Smoothing,
     Systematic,
     Tilt,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "Principle",
     "Ripple",
     "SensorModel",
+    "Smoothing",
     "Systematic",
     "Tilt",
     "read_sensor",

@@ -92,6 +92,7 @@ def judge(
         surface,
         pair.followup.capture.rig,
         other_stance=transfer.other_stance,
+        depth_excess_m2=pair.depth_excess_m2,
     )
     return tuple(
         _judge_one(

@@ -66,6 +66,7 @@ def vanished_spots(pair: VisitPair, transfer: Transfer) -> tuple[Spot, ...]:
         pair.followup.scan.surface,
         pair.followup.capture.rig,
         other_stance=transfer.other_stance,
+        depth_excess_m2=pair.depth_excess_m2,
     )
     out = []
     for number, row in enumerate(rows):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors import AnalysedCapture, Anchor
+from core.relocation.depth_floor import depth_excess_m2
 from core.relocation.types import LesionQuery
 from core.surface import SurfacePoint
 
@@ -39,6 +40,11 @@ class VisitPair:
 
     first: AnalysedCapture
     followup: AnalysedCapture
+
+    @cached_property
+    def depth_excess_m2(self) -> float:
+        """Variance in square metres by which the depth of both visits errs more than a Kinect v1's."""
+        return depth_excess_m2(self.first.scan) + depth_excess_m2(self.followup.scan)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:

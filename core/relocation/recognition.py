@@ -76,6 +76,7 @@ def recognise(pair: VisitPair, transfer: Transfer) -> Recognition:
         pair.followup.scan.surface,
         pair.followup.capture.rig,
         other_stance=transfer.other_stance,
+        depth_excess_m2=pair.depth_excess_m2,
     )
     visible = np.array([not h for h in sight.hidden], bool) & (sight.cosine > SQUARE_ON)
     rows = clear[visible]

@@ -12,6 +12,7 @@ from core.progress import Progress, ScaledProgress, no_progress
 from core.relocation.bones import Bone, bones
 from core.relocation.clock import PhaseClock
 from core.relocation.compatibility import why_not
+from core.relocation.depth_floor import widened
 from core.relocation.pair import KnownPlace, PickedLesion, VisitPair
 from core.relocation.registry import DEFAULT_METHOD, MethodContext, MethodOutcome, relocation_method
 from core.relocation.sides import with_sides_settled
@@ -101,9 +102,8 @@ def relocate(
     with clock.phase("visibility"):
         by_skeleton = options.check_visibility and not outcome.sight_judged and placed and not obstacle
         skeleton = bones(pair) if by_skeleton else ()
-        estimates = dict(
-            zip((id(p.query) for p in placed), zip(placed, outcome.estimates, strict=False), strict=False)
-        )
+        told = tuple(widened(estimate, pair.depth_excess_m2) for estimate in outcome.estimates)
+        estimates = dict(zip((id(p.query) for p in placed), zip(placed, told, strict=False), strict=False))
         lesions = tuple(
             _refused(query, pick.reason or "The click is not on the skin.")
             if pick.point is None

@@ -58,9 +58,19 @@ class Sight:
 
 
 def look_at(
-    places: FloatArray, normals: FloatArray, surface: BodySurface, rig: CameraRig, *, other_stance: bool
+    places: FloatArray,
+    normals: FloatArray,
+    surface: BodySurface,
+    rig: CameraRig,
+    *,
+    other_stance: bool,
+    depth_excess_m2: float = 0.0,
 ) -> Sight:
-    """Judge carried places (k, 3) with their normals (k, 3) in the depth-camera frame of the follow-up."""
+    """Judge carried places (k, 3) with their normals (k, 3) in the depth-camera frame of the follow-up.
+
+    Of their distance to the seen skin, what the sensors err more than a Kinect v1 is taken off
+    (`core.relocation.depth_floor`).
+    """
     if len(places) == 0:
         return Sight((), np.zeros(0), np.zeros(0))
     eyes = [np.zeros(3)]
@@ -70,6 +80,8 @@ def look_at(
         inside &= rig.color.contains(rig.project_to_picture(places), FRAME_MARGIN_PX)
     nearest = surface.nearest_arrays(places)[2]
     off = np.linalg.norm(nearest - places, axis=1)
+    if depth_excess_m2 > 0:
+        off = np.sqrt(np.maximum(off**2 - depth_excess_m2, 0.0))
     cosine = np.ones(len(places))
     covered = np.zeros(len(places), bool)
     for eye in eyes:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.capture.rgbd import RgbdCapture
+from core.capture.sensors import SensorModel, sensor_of
 from core.progress import Progress, no_progress
 from core.surface.body_surface import BodySurface
 from core.surface.denoise import denoise_depth
@@ -81,17 +82,24 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
     """
     camera = capture.rig.depth
     progress(0.0, "Fusing depth frames")
+    sensor, known = sensor_of(capture.sensor)
     fused = fuse_depth(capture.depth_frames, capture.depth_unit_m)
     progress(0.3, "Finding the body")
     mask = segment_body(fused.depth_m, camera)
     progress(0.6, "Smoothing the skin")
-    raw = np.where(mask.mask, fused.depth_m, 0.0)
-    smooth = denoise_depth(raw)
+    raw = np.where(_trimmed(mask.mask, sensor.smoothing.trim_px), fused.depth_m, 0.0)
+    smooth = denoise_depth(
+        raw, sigma_px=sensor.smoothing.window_px, gate_m=denoising_gate(sensor, raw, fused.frames)
+    )
     progress(0.8, "Building the surface")
     surface = BodySurface.from_depth(smooth, camera)
     noise = _noise(fused, raw)
     coverage = _coverage(mask.mask)
     warnings = list(mask.warnings)
+    if capture.sensor and not known:
+        warnings.append(
+            f"The depth sensor '{capture.sensor}' is not known; it was taken to be as noisy as a Kinect v1."
+        )
     if coverage < 0.85:
         warnings.append(
             f"Only {coverage:.0%} of the body's outline was measured; dark, shiny or steep parts are missing."
@@ -100,6 +108,21 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
     scan.prepare_clicks()
     progress(1.0, "Skin surface ready")
     return scan
+
+
+def denoising_gate(sensor: SensorModel, raw: FloatArray, frames: int) -> float:
+    """Depth difference in metres beyond which neighbours in a masked image (h, w) do not belong together."""
+    gate, sigmas = sensor.smoothing.gate_m, sensor.smoothing.gate_sigmas
+    if sigmas > 0 and (raw > 0).any():
+        gate = max(gate, sigmas * float(sensor.fused_sigma(float(np.median(raw[raw > 0])), frames)))
+    return gate
+
+
+def _trimmed(mask: NDArray[np.bool_], rim_px: int) -> NDArray[np.bool_]:
+    if rim_px == 0:
+        return mask
+    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * rim_px + 1, 2 * rim_px + 1))
+    return np.asarray(cv2.erode(mask.astype(np.uint8), window) > 0)
 
 
 def _noise(fused: FusedDepth, raw: FloatArray) -> float:

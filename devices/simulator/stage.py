@@ -39,6 +39,24 @@ def closest_on_surface(vertices: FloatArray, triangles: NDArray[np.int32], point
     return np.asarray(found["points"].numpy(), float)
 
 
+def first_hits(
+    vertices: FloatArray, triangles: NDArray[np.int32], rays: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Ray parameter (k,) and triangle normal (k, 3) where rays (k, 3) from the origin meet a mesh first.
+
+    The parameter is inf where a ray meets nothing.
+    """
+    o3d: Any = import_module("open3d")
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(triangles.astype(np.uint32))
+    )
+    packed = np.zeros((len(rays), 6), np.float32)
+    packed[:, 3:] = rays
+    found = scene.cast_rays(o3d.core.Tensor(packed))
+    return np.asarray(found["t_hit"].numpy(), float), np.asarray(found["primitive_normals"].numpy(), float)
+
+
 @dataclass(frozen=True, eq=False)
 class Actor:
     """A person in the room.
