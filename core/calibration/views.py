@@ -55,7 +55,7 @@ def guess_camera(size: tuple[int, int]) -> PinholeCamera:
 def board_pose(view: BoardView, spec: BoardSpec, camera: PinholeCamera) -> RigidTransform | None:
     """Camera frame from board frame; None if the corners do not determine it."""
     corners = spec.corners_m[view.ids]
-    rays = camera.rays(view.pixels)[:, :2]
+    rays = np.ascontiguousarray(camera.rays(view.pixels)[:, :2])
     found, turn, shift = cv2.solvePnP(
         corners, rays.reshape(-1, 1, 2), np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )

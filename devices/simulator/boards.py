@@ -336,3 +336,45 @@ def _between(start: RigidTransform, end: RigidTransform, share: float) -> RigidT
         np.asarray(cv2.Rodrigues(turn)[0]) @ start.rotation,
         start.translation + share * (end.translation - start.translation),
     )
+
+
+def good_poses(
+    board_rig: BoardRig,
+    spec: BoardSpec,
+    count: int,
+    seed: int = 0,
+    range_m: tuple[float, float] = (0.55, 1.35),
+) -> list[RigidTransform]:
+    """Poses (depth camera from board) as a person who follows the guidance holds a board.
+
+    Spread over the common picture of both cameras, over distances and over tilts up to 45 degrees; nearly all
+    of the board is in both pictures.
+    """
+    rng = np.random.default_rng((0x605E, seed))
+    rig = board_rig.rig
+    poses: list[RigidTransform] = []
+    tilts = [(0.0, 0.0), (35.0, 0.0), (-35.0, 0.0), (0.0, 35.0), (0.0, -35.0)]
+    tries = 0
+    while len(poses) < count and tries < 4000:
+        k = len(poses)
+        tries += 1
+        near, far = range_m
+        place = ((k % 4 + rng.uniform(0.1, 0.9)) / 4, ((k // 4) % 3 + rng.uniform(0.1, 0.9)) / 3)
+        # Evenly in the inverse distance: near views are worth more and are easier to hold.
+        z = 1.0 / rng.uniform(1 / far, 1 / near)
+        turn = np.deg2rad(np.array(tilts[(k * 2 + k // 5) % 5]) + rng.normal(0, 7, 2))
+        roll = float(np.clip(rng.normal(0, 8), -20, 20))
+        vector = np.array([-turn[1], turn[0], np.deg2rad(roll)])
+        rotation = np.asarray(cv2.Rodrigues(vector)[0], float)
+        size = np.array([rig.depth.width, rig.depth.height])
+        share = 0.5 + (np.array(place) - 0.5) * (1.0 - 0.004 * tries % 0.5)
+        ray = rig.depth.rays((share * size)[None])[0]
+        pose = RigidTransform(rotation, ray * z - rotation @ spec.centre_m)
+        corners = pose.apply(spec.corners_m)
+        if corners[:, 2].min() < 0.5 * near:
+            continue
+        seen = rig.depth.contains(rig.depth.project(corners), 6.0)
+        other = rig.picture_camera.contains(rig.project_to_picture(corners), 6.0)
+        if (seen & other).mean() > 0.93:
+            poses.append(pose)
+    return poses
