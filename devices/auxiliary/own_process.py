@@ -167,6 +167,7 @@ class CameraProcess:
         Cancelled
             Through ``progress``, which is called while waiting.
         """
+        progress(0.0)
         deadline = time.monotonic() + timeout_s
         with self._news:
             self._check_open()
