@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from devices.simulator.room import SimulatedRig
     from devices.simulator.truth import SimulatedCapture
 
-_PREVIEW_WIDTH = 320
 _FPS = 30
 
 
@@ -288,13 +287,10 @@ class SimulatedCamera:
         """Return the newest frame made small, None while the camera is closed or has none yet."""
         if not self._opened:
             return None
+        from devices.simulator.live_geometry import made_small
+
         frame = self.latest()
-        if frame is None or frame.depth is None or frame.rgb is None:
-            return None
-        depth = frame.depth[::2, ::2].astype(np.float32) * np.float32(frame.depth_unit_m)
-        height = round(frame.rgb.shape[0] * _PREVIEW_WIDTH / frame.rgb.shape[1])
-        rgb = cv2.resize(frame.rgb, (_PREVIEW_WIDTH, height), interpolation=cv2.INTER_AREA)
-        return PreviewFrame(depth, np.asarray(rgb, np.uint8))
+        return None if frame is None else made_small(frame)
 
     def modes(self) -> tuple[StreamMode, ...]:
         """One mode for each stream."""
