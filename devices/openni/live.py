@@ -33,7 +33,7 @@ from devices.openni.process import RuntimeProcess
 from devices.openni.ring import FrameRing
 from devices.openni.session import OpenedDevice, StartedStreams
 from devices.openni.settings import REGISTRATION
-from devices.openni.streams import StreamInfo
+from devices.openni.streams import Mode, StreamInfo
 
 HUNG_AFTER_S = 6.0
 """The runtime's process gives a sign of life many times a second; without one for this long it hangs."""
@@ -218,11 +218,15 @@ class OpenNICamera:
             raise
 
     def _begin(self, streams: Collection[StreamKind]) -> None:
+        chosen = {
+            kind: Mode(kind, mode.width, mode.height, mode.fps, mode.pixel_format)
+            for kind, mode in self._chosen.items()
+        }
         self._switching = True
         try:
             self._let_go(None)
             started: StartedStreams = self._runtime.request(
-                "start", kinds=tuple(streams), modes=dict(self._chosen), before=self._last_number
+                "start", kinds=tuple(streams), modes=chosen, before=self._last_number
             )
             with self._lock:
                 self._ring = FrameRing.attach(started.layout, started.ring)
@@ -234,7 +238,7 @@ class OpenNICamera:
 
     def modes(self) -> tuple[StreamMode, ...]:
         """Modes that can be chosen."""
-        return () if self._device is None else self._device.modes
+        return () if self._device is None else tuple(StreamMode(*mode) for mode in self._device.modes)
 
     def choose_mode(self, mode: StreamMode) -> None:
         """Run one stream in another mode; a profile for other image sizes is dropped.

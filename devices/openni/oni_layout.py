@@ -52,6 +52,8 @@ class OniStream:
     first_s, last_s : float
         Times of the first and the last frame.
     mirrored : bool
+    cropping : bool
+        Whether the file tells the cropping; the runtime's player delivers no frame of a stream without.
     """
 
     kind: str
@@ -64,15 +66,30 @@ class OniStream:
     first_s: float = 0.0
     last_s: float = 0.0
     mirrored: bool = False
+    cropping: bool = False
     seek_table: int = 0
     largest: int = 0
 
 
 @dataclass
 class OniSummary:
-    """Streams of a file by node number."""
+    """What a file holds.
+
+    Attributes
+    ----------
+    streams : dict of int to OniStream
+        By node number.
+    end : int
+        Bytes up to the end of the recording. The runtime's recorder leaves as much again of nothing behind it.
+    """
 
     streams: dict[int, OniStream] = field(default_factory=dict)
+    end: int = 0
+
+    @property
+    def playable(self) -> bool:
+        """Whether the runtime's player delivers its frames as it is; else `devices.openni.oni_mend` helps."""
+        return all(s.cropping for s in self.streams.values() if s.kind != "other")
 
     def stream(self, kind: str) -> OniStream | None:
         """The stream of a kind."""
@@ -115,6 +132,7 @@ class _Inspection:
         for _ in range(_MAX_RECORDS):
             kind, node, fields, payload = self._header(position)
             if kind == END:
+                self._summary.end = position + RECORD_HEADER.size + len(fields) + payload
                 break
             if kind == SEEK_TABLE:
                 tables.add(position)
@@ -176,6 +194,8 @@ class _Inspection:
             stream.width, stream.height, stream.fps = struct.unpack("<III", data)
         elif name == b"oniPixelFormat":
             stream.pixel_format = struct.unpack("<Q", data)[0]
+        elif name == b"xnCropping":
+            stream.cropping = True
         elif name == b"xnMirror":
             stream.mirrored = any(data)
         elif name == b"oniRequiredFrameSize" and struct.unpack("<Q", data)[0] > _MAX_FRAME_BYTES:

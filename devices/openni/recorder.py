@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import shutil
 import threading
@@ -17,6 +18,7 @@ from devices.live import LiveCamera, LiveFrame
 from devices.openni.calibration import NOMINAL_WARNING, calibration_path, write_calibration
 from devices.openni.live import OpenNICamera
 from devices.openni.oni_layout import inspect_oni
+from devices.openni.oni_mend import mend_oni
 from devices.openni.record_targets import (
     FolderTarget,
     OniTarget,
@@ -319,16 +321,32 @@ def _record_with_runtime(
 
 
 def _kept(partial: Path, path: Path) -> tuple[int, float]:
-    """Depth frames and seconds of what the runtime wrote, which gets its name if it is complete."""
+    """Depth frames and seconds of what the runtime wrote, made playable and given its name.
+
+    The runtime's process may have died in the middle, and its recorder leaves out what its player needs.
+    """
+    if not partial.exists():
+        return 0, 0.0
     try:
-        depth = inspect_oni(partial).stream("depth")
+        if not _playable(partial):
+            mend_oni(partial, partial)
+        summary = inspect_oni(partial)
+        depth = summary.stream("depth")
     except InputError:
         depth = None
     if depth is None or not depth.frames:
         partial.unlink(missing_ok=True)
         return 0, 0.0
+    os.truncate(partial, summary.end)
     partial.replace(path)
     return depth.frames, depth.last_s - depth.first_s
+
+
+def _playable(path: Path) -> bool:
+    try:
+        return inspect_oni(path).playable
+    except InputError:
+        return False
 
 
 def _quietly(action: Callable[[], None]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -29,6 +30,7 @@ from devices.openni.calibration import (
 )
 from devices.openni.oni_file import write_oni_frames
 from devices.openni.oni_layout import inspect_oni
+from devices.openni.oni_mend import mend_oni
 from devices.openni.process import RuntimeProcess
 from devices.openni.ring import FrameRing
 from devices.openni.session import StartedStreams
@@ -67,6 +69,7 @@ class OniRecording:
         self._runtime = RuntimeProcess("recording")
         self._ring: FrameRing | None = None
         self._started: StartedStreams | None = None
+        self._mended: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def info(self) -> DeviceInfo:
@@ -129,12 +132,21 @@ class OniRecording:
             return
         self.close()
         try:
-            self._runtime.request("open", address=str(self._path), is_file=True)
+            self._runtime.request("open", address=str(self._playable()), is_file=True)
             self._started = self._runtime.request("start", kinds=None)
             self._ring = FrameRing.attach(self._started.layout, self._started.ring)
         except BaseException:
             self.close()
             raise
+
+    def _playable(self) -> Path:
+        """The file, or a copy that has what the runtime's player needs and its recorder may leave out."""
+        if self._summary.playable:
+            return self._path
+        if self._mended is None:
+            self._mended = tempfile.TemporaryDirectory(prefix="geoderm-oni-")
+            mend_oni(self._path, Path(self._mended.name) / "mended.oni")
+        return Path(self._mended.name) / "mended.oni"
 
     def close(self) -> None:
         """End the process."""

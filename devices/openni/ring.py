@@ -15,12 +15,13 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.shared_memory import SharedMemory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.live import LiveFrame, StreamKind
+if TYPE_CHECKING:  # the runtime's process starts faster without what the application needs
+    from devices.live import LiveFrame, StreamKind
 
 SLOTS = 8
 KINDS: tuple[StreamKind, ...] = ("depth", "infrared", "color")
@@ -205,6 +206,8 @@ class FrameRing:
             images[kind], times[kind] = image, time_s
         if leader not in images:
             return None
+        from devices.live import LiveFrame
+
         return LiveFrame(
             number,
             times[leader],

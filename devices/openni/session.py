@@ -10,19 +10,21 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import WorkError
-from devices.live import StreamKind, StreamMode
 from devices.openni import settings
 from devices.openni.binding import binding_part
 from devices.openni.clock import DeviceClock
 from devices.openni.ring import KINDS, FrameRing, RingLayout
 from devices.openni.runtime import load_runtime
-from devices.openni.streams import OpenedStream, StreamInfo
+from devices.openni.streams import Mode, OpenedStream, StreamInfo
+
+if TYPE_CHECKING:
+    from devices.live import StreamKind
 
 FRAME_TIMEOUT_S = 3.0
 _PARTNER_SHARE = 0.5
@@ -44,7 +46,7 @@ class OpenedDevice:
         Empty if the driver does not tell one.
     kinds : tuple of str
         Streams there are.
-    modes : tuple of StreamMode
+    modes : tuple of Mode
     """
 
     uri: str
@@ -53,7 +55,7 @@ class OpenedDevice:
     usb: tuple[int, int]
     serial: str
     kinds: tuple[StreamKind, ...]
-    modes: tuple[StreamMode, ...]
+    modes: tuple[Mode, ...]
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,7 @@ class Session:
     def start(
         self,
         kinds: Collection[StreamKind] | None,
-        modes: Mapping[StreamKind, StreamMode] | None = None,
+        modes: Mapping[StreamKind, Mode] | None = None,
         before: int = 0,
     ) -> StartedStreams:
         """Run these streams from now on, None for all there are; frames are numbered from ``before + 1``."""

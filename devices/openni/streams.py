@@ -5,14 +5,16 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import WorkError
-from devices.live import StreamKind, StreamMode
 from devices.openni.binding import binding_part
+
+if TYPE_CHECKING:
+    from devices.live import StreamKind
 
 DEPTH_UNITS_M = {100: 1e-3, 101: 1e-4}
 _RGB888 = 200
@@ -24,6 +26,16 @@ _FORMATS: dict[StreamKind, dict[int, str]] = {
 _PREFERRED = (640, 480, 30)
 _PLAUSIBLE_FOV_RAD = (0.2, 2.6)
 _MAX_SIDE = 8192
+
+
+class Mode(NamedTuple):
+    """`devices.live.StreamMode` as it travels between the processes."""
+
+    kind: StreamKind
+    width: int
+    height: int
+    fps: int
+    pixel_format: str
 
 
 @dataclass(frozen=True)
@@ -79,11 +91,11 @@ class OpenedStream:
             self._choose_default()
         self.flips = not is_file and bool(told(stream.get_mirroring_enabled))
 
-    def modes(self) -> list[StreamMode]:
+    def modes(self) -> list[Mode]:
         """Modes whose pixels the application reads, without repetition."""
         formats = _FORMATS[self.kind]
         found = [
-            StreamMode(
+            Mode(
                 self.kind,
                 int(m.resolutionX),
                 int(m.resolutionY),
@@ -95,15 +107,15 @@ class OpenedStream:
         ]
         return list(dict.fromkeys(found))
 
-    def mode(self) -> StreamMode | None:
+    def mode(self) -> Mode | None:
         """The present mode; None if its pixels are of a kind the application does not read."""
         m = self.stream.get_video_mode()
         name = _FORMATS[self.kind].get(_number(m.pixelFormat))
         if name is None:
             return None
-        return StreamMode(self.kind, int(m.resolutionX), int(m.resolutionY), int(m.fps), name)
+        return Mode(self.kind, int(m.resolutionX), int(m.resolutionY), int(m.fps), name)
 
-    def choose(self, mode: StreamMode) -> None:
+    def choose(self, mode: Mode) -> None:
         """Change the mode of a stopped stream."""
         number = next(n for n, name in _FORMATS[self.kind].items() if name == mode.pixel_format)
         self.stream.configure_mode(mode.width, mode.height, mode.fps, number)

@@ -3,7 +3,8 @@
 // A device is a folder, opened as feed://FOLDER; those named in OPENNI_FEED_FOLDERS (separated by ':') are
 // connected when the runtime starts. In the folder:
 //   device.txt   lines key=value: name, vendor, vid, pid, serial (none: the property is not supported),
-//                width and height of the pictures in the files, ir_excludes_color=1, stamp=1 (the first four
+//                width and height of the pictures in the files, ir_excludes_color=1, cropping=0 (not known to the
+//                streams), stamp=1 (the first four
 //                depth pixels become the clock: monotonic nanoseconds when the frame was made)
 //   depth.raw (uint16, mm), color.raw (RGB), ir.raw (uint16): frames one after the other, played in a loop;
 //                a stream without a file does not exist. Other modes are sampled from the same files.
@@ -117,6 +118,7 @@ public:
     OniBool isPropertySupported(int id) override {
         if (m_kind == ONI_SENSOR_COLOR && id >= ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE && id <= ONI_STREAM_PROPERTY_GAIN)
             return TRUE;
+        if (id == ONI_STREAM_PROPERTY_CROPPING) return m_feed.number("cropping", 1) != 0;
         return id == ONI_STREAM_PROPERTY_VIDEO_MODE || id == ONI_STREAM_PROPERTY_HORIZONTAL_FOV ||
                id == ONI_STREAM_PROPERTY_VERTICAL_FOV || id == ONI_STREAM_PROPERTY_MIRRORING ||
                (id == ONI_STREAM_PROPERTY_MAX_VALUE && m_kind == ONI_SENSOR_DEPTH);
@@ -127,6 +129,7 @@ public:
         if (!isPropertySupported(id)) return ONI_STATUS_NOT_SUPPORTED;
         switch (id) {
         case ONI_STREAM_PROPERTY_VIDEO_MODE: return put(m_mode, data, size);
+        case ONI_STREAM_PROPERTY_CROPPING: return put(OniCropping{FALSE, 0, 0, m_mode.resolutionX, m_mode.resolutionY}, data, size);
         case ONI_STREAM_PROPERTY_HORIZONTAL_FOV: return put(1.0145f, data, size);
         case ONI_STREAM_PROPERTY_VERTICAL_FOV: return put(0.7898f, data, size);
         case ONI_STREAM_PROPERTY_MIRRORING: return put(OniBool(m_mirror), data, size);
