@@ -80,7 +80,7 @@ class OniSummary:
     streams : dict of int to OniStream
         By node number.
     end : int
-        Bytes up to the end of the recording. The runtime's recorder leaves as much again of nothing behind it.
+        Bytes up to the end of the recording. The runtime's recorder may leave much nothing behind it.
     """
 
     streams: dict[int, OniStream] = field(default_factory=dict)
