@@ -1,4 +1,8 @@
-"""A recording in the place of a camera: played in real time, again and again."""
+"""A recording in the place of a camera: played in real time, again and again.
+
+At the end of an ``.oni`` file there is a pause of about a second: the runtime cannot go back in a file without
+crashing, so it is started anew.
+"""
 
 from __future__ import annotations
 
@@ -150,14 +154,15 @@ class PlayedCamera:
 
     def _play_once(self) -> int:
         """Play from beginning to end; return how many frames there were."""
-        due, last_s, count = time.monotonic(), None, 0
+        due_s, last_s, count = 0.0, None, 0
         for frame in self._source.frames():
-            gap = NOMINAL_PERIOD_S if last_s is None else frame.time_s - last_s
+            now = time.monotonic()
+            gap = 0.0 if last_s is None else frame.time_s - last_s
             last_s = frame.time_s
-            due += min(max(gap, 0.0), LONGEST_GAP_S)
-            if self._stop.wait(max(due - time.monotonic(), 0.0)):
+            # A computer that was busy goes on from now: it does not rush after what it missed.
+            due_s = max(due_s + min(max(gap, 0.0), LONGEST_GAP_S), now - NOMINAL_PERIOD_S)
+            if self._stop.wait(max(due_s - now, 0.0)):
                 return count + 1
-            due = max(due, time.monotonic() - LONGEST_GAP_S)  # a machine that was busy does not rush after
             count += 1
             self._show(frame)
         return count
