@@ -3,6 +3,7 @@
 from core.anchors.analyse import AnalysedCapture, analyse_capture, with_skeleton
 from core.anchors.calibration import SkeletonCalibration, apply_calibration, calibrate_skeleton
 from core.anchors.finding import find_skeleton
+from core.anchors.joint_fusion import fuse_skeletons
 from core.anchors.left_right import LeftRightReport, Sides, exchange_sides, guard_left_right
 from core.anchors.live import LiveSkeleton, PictureFollower
 from core.anchors.live_pose import LiveJoint, LivePose
@@ -11,6 +12,7 @@ from core.anchors.psi import PsiReport, check_psi
 from core.anchors.relief import shade_depth
 from core.anchors.skeleton import VISIBLE, Joint, PoseLandmarks, Skeleton, SkeletonTracker
 from core.anchors.skin_anchors import Anchor, AnchorSet, project_to_skin
+from core.anchors.tracked import DepthTracker, TrackedPerson, TrackingState, tracked_skeleton
 
 __all__ = [
     "BONES",
@@ -21,6 +23,7 @@ __all__ = [
     "AnalysedCapture",
     "Anchor",
     "AnchorSet",
+    "DepthTracker",
     "Joint",
     "LeftRightReport",
     "LiveJoint",
@@ -33,15 +36,19 @@ __all__ = [
     "Skeleton",
     "SkeletonCalibration",
     "SkeletonTracker",
+    "TrackedPerson",
+    "TrackingState",
     "analyse_capture",
     "apply_calibration",
     "calibrate_skeleton",
     "check_psi",
     "exchange_sides",
     "find_skeleton",
+    "fuse_skeletons",
     "guard_left_right",
     "opposite",
     "project_to_skin",
     "shade_depth",
+    "tracked_skeleton",
     "with_skeleton",
 ]

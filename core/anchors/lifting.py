@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from core.anchors.covariance import OTHER_LAYER, lifted_covariance
 from core.anchors.names import EXTRA_NAMES, JOINT_NAMES, LANDMARK_NAMES, LIMBS
 from core.anchors.skeleton import VISIBLE, Joint, JointSource, PoseLandmarks, Skeleton
 from core.capture.camera import PinholeCamera
@@ -110,6 +111,10 @@ class _Spot:
     depths: FloatArray
     shares: FloatArray
 
+    def ambiguity_m(self, chosen: float) -> float:
+        """Root of the expected square of the error, should another layer be the right one."""
+        return float(np.sqrt(OTHER_LAYER * (self.shares @ (self.depths - chosen) ** 2)))
+
 
 def picture_joints(landmarks: PoseLandmarks, camera: PinholeCamera) -> dict[str, tuple[FloatArray, float]]:
     """The 15 joints and the extra landmarks as (pixel, visibility), from the 33 landmarks.
@@ -148,6 +153,30 @@ def picture_joints(landmarks: PoseLandmarks, camera: PinholeCamera) -> dict[str,
     }
 
 
+_SPREAD_OF: Final[dict[str, tuple[str, ...]]] = {
+    "head": ("left_ear", "right_ear"),
+    "neck": ("left_shoulder", "right_shoulder"),
+    "torso": ("left_shoulder", "right_shoulder", "left_hip", "right_hip"),
+    "left_hand": ("left_wrist", "left_pinky", "left_index"),
+    "right_hand": ("right_wrist", "right_pinky", "right_index"),
+    "left_foot": ("left_ankle",),
+    "right_foot": ("right_ankle",),
+}
+"""Landmarks of the joints that are not landmarks themselves."""
+
+
+def picture_spreads(landmarks: PoseLandmarks) -> dict[str, float]:
+    """How far the looks at each joint differ, pixels along one axis; a joint's landmarks err together."""
+    if landmarks.spread_px is None:
+        return {}
+    return {
+        name: float(
+            np.mean([landmarks.spread_px[LANDMARK_NAMES.index(n)] for n in _SPREAD_OF.get(name, (name,))])
+        )
+        for name in (*JOINT_NAMES, *EXTRA_NAMES)
+    }
+
+
 def lift(landmarks: PoseLandmarks, source: JointSource, rig: CameraRig, surface: BodySurface) -> Skeleton:
     """Skeleton in the depth-camera frame from landmarks in pixels.
 
@@ -168,6 +197,7 @@ def lift(landmarks: PoseLandmarks, source: JointSource, rig: CameraRig, surface:
         for name, (pixel, visibility) in places.items()
     }
     chosen = {name: int(np.argmax(spot.shares)) for name, spot in spots.items()}
+    seen = dict(spots)
     for limb in LIMBS:
         chosen.update(_plausible_limb(limb, spots, sight, chosen))
         if all(spots[name].visibility >= VISIBLE for name in limb):
@@ -175,11 +205,22 @@ def lift(landmarks: PoseLandmarks, source: JointSource, rig: CameraRig, surface:
             chosen[limb[1]] = 0
     joints: dict[str, Joint] = {}
     extras: dict[str, Joint] = {}
+    spreads = picture_spreads(landmarks)
+    origin = sight.camera_from_depth.inverse().translation
     for name, spot in spots.items():
-        depth = spot.depths[chosen[name]] + interior_m(name)
-        point = sight.points(spot.pixel, np.array([depth]))[0]
+        skin = float(spot.depths[chosen[name]])
+        point = sight.points(spot.pixel, np.array([skin + interior_m(name)]))[0]
         pixel = rig.project_to_picture(point)[0]
-        joint = Joint(name, point, pixel, spot.visibility, source)
+        covariance = lifted_covariance(
+            name,
+            point - origin,
+            visibility=spot.visibility,
+            spread_m=spreads.get(name, 0.0) * skin / patches.focal,
+            patch_m=patches.depth_spread_m(spot.pixel, skin),
+            ambiguity_m=seen[name].ambiguity_m(skin),
+            relief=source == "relief",
+        )
+        joint = Joint(name, point, pixel, spot.visibility, source, covariance)
         (joints if name in JOINT_NAMES else extras)[name] = joint
     return Skeleton(joints, extras, source)
 
@@ -194,11 +235,11 @@ class _Patches:
         ok = np.isfinite(pixels).all(1)
         self._pixels, self._depth = pixels[ok], in_camera[ok, 2]
         self._tree = cKDTree(self._pixels)
-        self._focal = (sight.camera.fx + sight.camera.fy) / 2
+        self.focal = (sight.camera.fx + sight.camera.fy) / 2
 
     def around(self, pixel: FloatArray, radius_m: float, depth: float) -> tuple[FloatArray, FloatArray]:
         """Pixels (k, 2) and depths (k,) of the surface around a pixel, in the layer that has this depth."""
-        rows = np.asarray(self._tree.query_ball_point(pixel, radius_m * self._focal / depth), dtype=int)
+        rows = np.asarray(self._tree.query_ball_point(pixel, radius_m * self.focal / depth), dtype=int)
         rows = rows[np.argsort(self._depth[rows])]
         cuts = np.flatnonzero(np.diff(self._depth[rows]) > LAYER_GAP_M) + 1
         layers = [layer for layer in np.split(rows, cuts) if len(layer)]
@@ -207,14 +248,19 @@ class _Patches:
         layer = min(layers, key=lambda k: float(np.abs(self._depth[k] - depth).min()))
         return self._pixels[layer], self._depth[layer]
 
+    def depth_spread_m(self, pixel: FloatArray, depth: float) -> float:
+        """Standard deviation of the depths under a pixel in its layer; the patch's radius without a layer."""
+        _, depths = self.around(pixel, PATCH_M, depth)
+        return float(np.std(depths)) if len(depths) >= 5 else PATCH_M
+
     def metres_apart(self, pixels: FloatArray, pixel: FloatArray, depth: float) -> FloatArray:
         """Distances across the picture, in metres at a depth."""
-        return np.asarray(np.linalg.norm(pixels - pixel, axis=1) * depth / self._focal)
+        return np.asarray(np.linalg.norm(pixels - pixel, axis=1) * depth / self.focal)
 
     def spot(self, pixel: FloatArray, visibility: float, percentile: float = PERCENTILE) -> _Spot:
         """Depths of the layers of skin under a pixel; beside the body the nearest outline serves."""
         distance, nearest = self._tree.query(pixel)
-        per_metre = self._focal / self._depth[nearest]
+        per_metre = self.focal / self._depth[nearest]
         rows = np.asarray(self._tree.query_ball_point(pixel, PATCH_M * per_metre), dtype=int)
         if len(rows) < 5:
             visibility *= 0.8 if distance < REACH_M * per_metre else 0.0

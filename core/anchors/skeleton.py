@@ -14,7 +14,7 @@ from core.anchors.names import JOINT_NAMES
 
 FloatArray = NDArray[np.float64]
 
-JointSource = Literal["color", "relief", "recording", "hand"]
+JointSource = Literal["color", "relief", "recording", "hand", "nite2"]
 
 VISIBLE: Final = 0.5
 """Visibility from which a joint counts as seen (METHOD section 3)."""
@@ -30,10 +30,13 @@ class PoseLandmarks:
         Places in the picture, order of `names.LANDMARK_NAMES`. May lie outside the picture.
     visibility : ndarray (33,)
         0 (hidden or invented) to 1 (seen).
+    spread_px : ndarray (33,) or None
+        How far several looks at the same person differ, standard deviation along one axis; None for one look.
     """
 
     pixels: FloatArray
     visibility: FloatArray
+    spread_px: FloatArray | None = None
 
 
 class SkeletonTracker(Protocol):
@@ -63,8 +66,11 @@ class Joint:
         Picture pixel of `point_m`.
     visibility : float
         0 to 1; below `VISIBLE` the joint is a guess.
-    source : {"color", "relief", "recording", "hand"}
+    source : {"color", "relief", "recording", "hand", "nite2"}
         Where the joint was found.
+    covariance_m2 : ndarray (3, 3) or None
+        Of `point_m` against the true joint centre, depth-camera frame; None where nothing is known, as for
+        joints that came with a recording.
     """
 
     name: str
@@ -72,6 +78,12 @@ class Joint:
     pixel: FloatArray
     visibility: float
     source: JointSource
+    covariance_m2: FloatArray | None = None
+
+    @property
+    def sigma_m(self) -> float | None:
+        """Standard deviation along one axis, averaged over the directions."""
+        return None if self.covariance_m2 is None else float(np.sqrt(np.trace(self.covariance_m2) / 3.0))
 
     def moved(self, point_m: FloatArray, pixel: FloatArray, visibility: float | None = None) -> Joint:
         """The same joint at another place."""
@@ -89,7 +101,7 @@ class Skeleton:
         Keys are among `names.JOINT_NAMES`, in that order.
     landmarks : mapping of str to Joint
         Extra repeatable points on the skin, keys among `names.EXTRA_NAMES`.
-    source : {"color", "relief", "recording", "hand"}
+    source : {"color", "relief", "recording", "hand", "nite2"}
     warnings : tuple of str
         For the doctor.
     """

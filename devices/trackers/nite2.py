@@ -1,0 +1,107 @@
+"""NiTE2, the skeleton tracker of the thesis, where its proprietary runtime is installed.
+
+It never ran where this was written: there is no NiTE2 runtime for it to be tried with. Its loading, messages,
+process, structures and coordinates are tested; its tracking is not.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, Final
+
+from core.anchors.tracked import TrackedPerson
+from core.capture.camera import PinholeCamera
+from core.errors import WorkError
+from devices.trackers.nite2_worker import serve
+
+START_TIMEOUT_S: Final = 20.0
+_GRACE_S: Final = 1.0
+
+
+class Nite2Tracker:
+    """A `DepthTracker` by NiTE2, in a process of its own. Safe to call from any thread.
+
+    Parameters
+    ----------
+    camera : PinholeCamera, optional
+        The calibrated depth camera; by default the runtime's own idea of it.
+    """
+
+    name: Final = "NiTE2"
+
+    def __init__(self, camera: PinholeCamera | None = None) -> None:
+        self._camera = camera
+        self._lock = threading.Lock()
+        self._process: BaseProcess | None = None
+        self._pipe: Connection | None = None
+
+    def start(self, source: str = "") -> None:
+        """Begin to follow people; see `core.anchors.tracked.DepthTracker.start`."""
+        with self._lock:
+            self._stop()
+            context = multiprocessing.get_context("spawn")
+            here, there = context.Pipe()
+            self._process = context.Process(target=serve, args=(there,), name="geoderm-nite2", daemon=True)
+            self._process.start()
+            there.close()
+            self._pipe = here
+            try:
+                self._ask("start", START_TIMEOUT_S, source=source)
+            except WorkError:
+                self._stop()
+                raise
+
+    def read(self, timeout_s: float = 2.0) -> TrackedPerson:
+        """The next moment; see `core.anchors.tracked.DepthTracker.read`."""
+        with self._lock:
+            person = self._ask("read", timeout_s, camera=self._camera)
+        if not isinstance(person, TrackedPerson):
+            raise WorkError("NiTE2 answered with something else than a person.")
+        return person
+
+    def close(self) -> None:
+        """End the process. Closing twice does nothing."""
+        with self._lock:
+            self._stop()
+
+    @property
+    def pid(self) -> int | None:
+        """Process id, for diagnosis."""
+        return None if self._process is None else self._process.pid
+
+    def _ask(self, operation: str, timeout_s: float, **arguments: object) -> Any:
+        if self._pipe is None:
+            raise WorkError("The NiTE2 tracker was not started.")
+        try:
+            self._pipe.send((operation, arguments))
+            if not self._pipe.poll(timeout_s):
+                self._stop()
+                raise WorkError(
+                    f"NiTE2 did not answer for {timeout_s:.0f} seconds.",
+                    "Check the camera's cable, then start the tracker again.",
+                )
+            answer = self._pipe.recv()
+        except (EOFError, OSError) as error:
+            self._stop()
+            raise WorkError(
+                "NiTE2 crashed; nothing else was harmed.", "Start the tracker again, or use MediaPipe."
+            ) from error
+        if answer[0] == "done":
+            return answer[1]
+        raise WorkError(answer[1], answer[2])
+
+    def _stop(self) -> None:
+        pipe, self._pipe = self._pipe, None
+        process, self._process = self._process, None
+        if pipe is not None:
+            pipe.close()
+        if process is None:
+            return
+        process.join(_GRACE_S)
+        if process.is_alive():
+            process.kill()
+            process.join(5.0)
+        process.close()
