@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -245,7 +246,7 @@ def test_a_camera_that_is_not_connected_is_said() -> None:
 def test_without_the_library_there_are_no_devices_and_a_clear_message(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pyrealsense2", None)
+    monkeypatch.setitem(sys.modules, "pyrealsense2", None)
     monkeypatch.setattr(library, "find_spec", lambda name: None)
     assert REALSENSE_CAMERAS.devices() == []
     with pytest.raises(WorkError, match=r"geoderm\[realsense\]"):
