@@ -40,7 +40,8 @@ def devices(
     if as_json:
         typer.echo(json.dumps(described, indent=1))
         for note in notes:
-            typer.echo(note, err=True)
+            if note.startswith("The OpenNI2 runtime was not found"):
+                typer.echo(note, err=True)
         return
     width = max((len(d["id"]) for d in described), default=0)
     for device in described:

@@ -1,7 +1,7 @@
 """A recording in the place of a camera: played in real time, again and again.
 
-At the end of an ``.oni`` file there is a pause of about a second: the runtime cannot go back in a file without
-crashing, so it is started anew.
+At the end of an ``.oni`` file there is a pause of about a second: the runtime cannot go back in a file
+without crashing, so it is started anew.
 """
 
 from __future__ import annotations

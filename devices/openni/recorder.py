@@ -33,6 +33,7 @@ MAX_WAITING = 60
 
 MIN_FREE_BYTES = 100_000_000
 _SILENCE_S = 5.0
+_FIRST_FRAME_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ def _live_frames(camera: LiveCamera, stop: threading.Event) -> Iterator[LiveFram
     """Every frame that can be caught from now on, until ``stop`` is set."""
     newest = camera.latest(0, 0.0)
     number = 0 if newest is None else newest.number
-    heard_s = time.monotonic()
+    heard_s = time.monotonic() + (0.0 if number else _FIRST_FRAME_S - _SILENCE_S)
     while not stop.is_set():
         frame = camera.latest(number, 0.2)
         if frame is not None:

@@ -10,15 +10,19 @@ from __future__ import annotations
 
 import contextlib
 import secrets
+import shutil
 import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from core.errors import WorkError
 
 if TYPE_CHECKING:  # the runtime's process starts faster without what the application needs
     from devices.live import LiveFrame, StreamKind
@@ -89,6 +93,7 @@ class FrameRing:
     @classmethod
     def create(cls, layout: RingLayout) -> FrameRing:
         """A new ring."""
+        _check_room(layout.size)
         memory = SharedMemory(f"geoderm-{secrets.token_hex(6)}", create=True, size=layout.size)
         ring = cls(layout, memory)
         ring._head["newest"], ring._head["arrived_s"] = layout.before, time.monotonic()
@@ -216,4 +221,14 @@ class FrameRing:
             images.get("color"),
             times.get("color", 0.0),
             images.get("infrared"),
+        )
+
+
+def _check_room(size: int) -> None:
+    """Refuse before the system grants memory that is not there, and ends the process when it is used."""
+    folder = Path("/dev/shm")
+    if folder.is_dir() and shutil.disk_usage(folder).free < size:
+        raise WorkError(
+            f"There is no room for the camera's pictures in shared memory ({size // 1_000_000} MB).",
+            "Choose a smaller mode, close other programs, or enlarge /dev/shm.",
         )
