@@ -19,6 +19,7 @@ run: setup ## Open the application
 	@.venv/bin/geoderm run
 
 test: setup ## Run the test suite
+	@.setup/test-packages
 	@$(PYTHON) -m pytest -q -n 2 --dist loadfile tests --ignore=tests/gui --ignore=tests/benchmarks
 	@.setup/virtual-screen $(PYTHON) -m pytest -q tests/gui
 
