@@ -28,6 +28,7 @@ COMMAND_MODULES = (
     "app.cli.devices",
     "app.cli.record",
     "app.cli.play",
+    "app.cli.capture",
 )
 """Each has ``register(app)``. Their heavy imports happen inside the commands."""
 
