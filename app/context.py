@@ -9,6 +9,8 @@ Public API
 ``context.privacy_mode``     names are hidden; use ``context.patient_title(patient)`` wherever a name is shown
 ``context.demonstration``    True on the demonstration clinic
 ``context.cameras``          `CameraSource`: ``.list() -> list[DeviceInfo]``, ``.open(id) -> DepthCamera``
+``context.open_camera(id)``  the opened camera with its newest calibration (slow: call it in a task)
+``context.profiles``         `core.calibration.profile.ProfileStore` of this workstation
 ``context.tracker()``        the `core.anchors.SkeletonTracker` (slow on first use: call it in a task)
 ``context.method``           the relocation method's name, or None for the default
 
@@ -18,6 +20,7 @@ Signals: ``user_changed()``, ``privacy_changed(bool)``, ``records_changed(int)``
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -25,17 +28,24 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from PySide6.QtCore import QObject, Signal
 
+from app.paths import calibration_dir
 from app.settings import Settings, read_settings, write_settings
 from app.tasks import TaskRunner
-from core.errors import WorkError
+from core.errors import GeodermError, WorkError
 
 if TYPE_CHECKING:
     from core.anchors import SkeletonTracker
+    from core.calibration.profile import ProfileStore
     from core.records import ClinicStore, Patient, User
     from devices.camera import DepthCamera, DeviceInfo
 
 
-_SLOW_KIND = "openni"
+_LOGGER = logging.getLogger(__name__)
+
+_QUICK_KINDS = ("simulator", "folder", "recording")
+"""Kinds that are listed without asking any driver."""
+
+_FILE_KINDS = ("folder", "recording")
 
 
 class CameraSource(Protocol):
@@ -51,8 +61,8 @@ class CameraSource(Protocol):
 class RegisteredCameras:
     """The cameras of `devices.registry`.
 
-    Asking the OpenNI2 runtime what is connected starts a process and may take seconds: it is done in the
-    background, and `list` tells what was found last.
+    Asking a driver what is connected starts a process and may take seconds: it is done in the background, and
+    `list` tells what was found last.
     """
 
     def __init__(self) -> None:
@@ -66,16 +76,24 @@ class RegisteredCameras:
             self._looking.start()
 
     def _look(self) -> None:
-        from devices.registry import list_devices
+        from devices.registry import camera_kinds, list_devices
 
-        self._connected = list(list_devices(_SLOW_KIND))
+        found: list[DeviceInfo] = []
+        for kind in camera_kinds():
+            if kind in _QUICK_KINDS:
+                continue
+            try:
+                found += list_devices(kind)
+            except GeodermError as error:
+                _LOGGER.warning("Cameras of kind %s could not be listed: %s", kind, error.message)
+        self._connected = found
 
     def list(self) -> list[DeviceInfo]:
         """Every camera that could be opened, connected ones as last seen."""
         from devices.registry import camera_kinds, list_devices
 
         self.look()
-        quick = [d for kind in camera_kinds() if kind != _SLOW_KIND for d in list_devices(kind)]
+        quick = [d for kind in camera_kinds() if kind in _QUICK_KINDS for d in list_devices(kind)]
         return [*self._connected, *quick]
 
     def open(self, camera_id: str) -> DepthCamera:
@@ -190,6 +208,36 @@ class AppContext(QObject):
     def touch(self, patient_id: int) -> None:
         """Tell every page that the patient's records have changed."""
         self.records_changed.emit(patient_id)
+
+    @property
+    def profiles(self) -> ProfileStore:
+        """Calibration profiles of the rigs of this workstation."""
+        from core.calibration.profile import ProfileStore
+
+        return ProfileStore(calibration_dir(self.data_dir))
+
+    def open_camera(self, camera_id: str) -> DepthCamera:
+        """The opened camera with that id; a live one with the newest calibration profile of its rig.
+
+        May take seconds, and may be called in any thread.
+
+        Raises
+        ------
+        GeodermError
+            If there is no such camera, or it cannot be opened.
+        """
+        from devices.live import LiveCamera
+        from devices.registry import open_device
+
+        kind = camera_id.partition(":")[0]
+        camera = open_device(camera_id) if kind in _FILE_KINDS else self.cameras.open(camera_id)
+        camera.open()
+        if isinstance(camera, LiveCamera):
+            identity = camera.identity
+            profile = self.profiles.newest(identity.depth_serial, identity.color_serial)
+            if profile is not None:
+                camera.use_profile(profile)
+        return camera
 
     def tracker(self) -> SkeletonTracker:
         """The skeleton tracker, made on first use (seconds: call it in a task)."""

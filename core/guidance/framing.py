@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.anchors.live_pose import LivePose
+from core.capture.sensors import sensor_model, sensor_names
 from core.guidance.moment import Moment
 from core.guidance.person import Person
 from core.guidance.readings import Reading, State, unknown
@@ -18,6 +19,9 @@ BoolArray = NDArray[np.bool_]
 FRAMED_SHARE: Final = 0.55
 """A standing person should fill at least this share of the picture's height."""
 
+_GOOD_SIGMA_M: Final = 0.015
+_SIGMA_M: Final = 0.022
+_FARTHEST_GOOD_M: Final = 3.5
 _EDGE_SHARE: Final = 0.06
 _EDGE_M: Final = 0.025
 _UPRIGHT_M: Final = 1.2
@@ -41,13 +45,21 @@ class Reach:
     far_m: float = 3.6
 
     @classmethod
-    def of_sensor(cls, near_m: float, far_m: float) -> Reach:
-        """From the range in which a sensor measures at all.
+    def of_sensor(cls, name: str) -> Reach:
+        """Of a sensor by the name of its noise model; the defaults (a Kinect's) for one that is not known.
 
-        Errors of triangulating sensors grow with the square of the distance: the farther third of the range
-        is left alone.
+        Far is where a single measurement of skin gets too uncertain for thirty of them to make up for it.
         """
-        return cls(near_m, near_m + 0.3, max(near_m + 0.6, 0.75 * far_m), 0.9 * far_m)
+        if name not in sensor_names():
+            return cls()
+        model = sensor_model(name)
+        z = np.linspace(model.near_m, model.far_m, 256)
+        sigma = np.asarray(model.axial_sigma(z))
+        good, far = (float(z[sigma <= most].max(initial=model.near_m)) for most in (_GOOD_SIGMA_M, _SIGMA_M))
+        near = max(model.near_m, 0.5)
+        good_near = max(near + 0.4, 1.0)
+        good = max(min(good, _FARTHEST_GOOD_M), good_near + 0.5)
+        return cls(near, good_near, good, max(min(far, _FARTHEST_GOOD_M + 0.5), good + 0.3))
 
 
 def distance_reading(person: Person, moment: Moment, reach: Reach) -> Reading:

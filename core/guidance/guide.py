@@ -79,9 +79,9 @@ class LiveGuide:
                 *_of_picture(moment, person),
                 coverage_reading(person),
             ]
-        found.append(self._meter.update(moment, person))
         if psi:
-            found.append(stance_reading(moment, person, whole_body=whole_body))
+            found.insert(2, stance_reading(moment, person, whole_body=whole_body))
+        found.append(self._meter.update(moment, person))
         return Guidance(time_s, {reading.name: reading for reading in found}, person is not None)
 
 

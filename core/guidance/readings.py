@@ -8,7 +8,7 @@ from typing import Final, Literal
 State = Literal["good", "fair", "bad", "unknown"]
 """How a reading is; "unknown" where there is nothing to judge it by."""
 
-READING_NAMES: Final = ("distance", "frame", "light", "backlight", "blur", "coverage", "stillness", "stance")
+READING_NAMES: Final = ("distance", "frame", "stance", "light", "backlight", "blur", "coverage", "stillness")
 """Every reading there is, in the order in which they matter to a person who is being placed."""
 
 _WORSE: Final[dict[State, int]] = {"unknown": 0, "good": 0, "fair": 1, "bad": 2}

@@ -163,7 +163,7 @@ def _judge_depth(
         findings.append(
             Finding("cut", "usable", float(len(sides)), f"The body is cut off {where}: step back if you can.")
         )
-    reach = Reach()
+    reach = Reach.of_sensor(scan.capture.sensor)
     if distance > reach.far_m:
         say = f"The patient stood {distance:.1f} m away, where depth is uncertain: come closer."
         findings.append(Finding("distance", "usable", distance, say))

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSignalBlocker, Signal, Slot
-from PySide6.QtGui import QIcon, QImage
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal, Slot
+from PySide6.QtGui import QIcon, QImage, QKeyEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -16,21 +16,31 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QStackedLayout,
     QVBoxLayout,
     QWidget,
 )
 
 from app.theme import icon, palette, set_state, style_class
+from app.widgets.live_strip import ReadingStrip
+from app.widgets.live_view import LiveView
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.camera_deck import CameraDeck
-from app.windows.visit.pictures import joints_picture, preview_picture
-from app.windows.visit.side_panel import BulletList, SidePanel, field_label
+from app.windows.visit.live_controls import AssistControls
+from app.windows.visit.live_verdict import VerdictPanel
+from app.windows.visit.pictures import joints_picture
+from app.windows.visit.side_panel import BulletList, SidePanel, field_label, wrapped
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
-    from devices.camera import PreviewFrame
 
 VIEWS = ("front", "back", "left", "right")
+TURNS = {
+    "front": "Next: front. Ask the patient to face the camera.",
+    "back": "Next: back. Ask the patient to turn round.",
+    "left": "Next: left. The patient's left side to the camera.",
+    "right": "Next: right. The patient's right side to the camera.",
+}
 STANCES = (
     ("A", "Arms a little out"),
     ("down", "Arms down"),
@@ -63,12 +73,15 @@ class CaptureScreen(QWidget):
         Another view or simulated stance was chosen.
     live_toggled()
         The camera's picture, or the capture, is to be shown.
+    escaped()
+        Esc was pressed.
     """
 
     primary_clicked = Signal()
     secondary_clicked = Signal()
     pose_changed = Signal()
     live_toggled = Signal()
+    escaped = Signal()
 
     def __init__(self, name: str, deck: CameraDeck, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -77,6 +90,11 @@ class CaptureScreen(QWidget):
         self._live = True
         self.photo = PhotoView()
         self.photo.setObjectName(f"{name}_photo")
+        self.live_view = LiveView()
+        self.live_view.setObjectName(f"{name}_live_view")
+        self.strip = ReadingStrip(name)
+        self.controls = AssistControls(name)
+        self.verdict = VerdictPanel(name)
         self.caption = QLabel()
         self.caption.setObjectName(f"{name}_photo_caption")
         style_class(self.caption, "caption")
@@ -94,7 +112,6 @@ class CaptureScreen(QWidget):
         self._build_controls()
         self._build_layout()
         deck.changed.connect(self._on_camera)
-        deck.frame.connect(self._on_frame)
         self._on_camera()
 
     # --- building ------------------------------------------------------------------------------------
@@ -119,6 +136,13 @@ class CaptureScreen(QWidget):
             self.views.addButton(button, i)
             self.view_row.addWidget(button, 1)
         self.views.idClicked.connect(lambda _: self.pose_changed.emit())
+        self.next_view = QPushButton()
+        self.next_view.setObjectName(f"{self._name}_next_view")
+        self.next_view.setIconSize(QSize(16, 16))
+        style_class(self.next_view, "quiet")
+        self.next_view.clicked.connect(self._go_to_next_view)
+        self.next_view.hide()
+        self._next = ""
         self.stance_box = QComboBox()
         self.stance_box.setObjectName(f"{self._name}_stance")
         for key, text in STANCES:
@@ -137,19 +161,26 @@ class CaptureScreen(QWidget):
         style_class(frame, "photo")
         inside = QVBoxLayout(frame)
         inside.setContentsMargins(1, 1, 1, 1)
-        inside.addWidget(self.photo)
+        self._pictures = QStackedLayout()
+        self._pictures.addWidget(self.live_view)
+        self._pictures.addWidget(self.photo)
+        inside.addLayout(self._pictures)
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(frame, 1)
+        left.addWidget(self.strip)
         below = QHBoxLayout()
         below.addWidget(self.caption, 1)
         below.addWidget(self.live_button)
         left.addLayout(below)
         body = self.panel.body
         body.addWidget(self.corrections)
+        body.addWidget(self.verdict)
         self.camera_label = field_label("Camera")
         body.addWidget(self.camera_label)
         body.addWidget(self.camera_box)
+        self.calibration = wrapped("", "caption", f"{self._name}_calibration")
+        body.addWidget(self.calibration)
         files = QHBoxLayout()
         files.setSpacing(8)
         files.addWidget(self.open_folder, 1)
@@ -159,9 +190,11 @@ class CaptureScreen(QWidget):
         body.addSpacing(4)
         body.addWidget(self.view_label)
         body.addLayout(self.view_row)
+        body.addWidget(self.next_view)
         body.addSpacing(4)
         body.addWidget(self.stance_label)
         body.addWidget(self.stance_box)
+        body.addWidget(self.controls)
         body.addWidget(self.warnings)
         body.addStretch(1)
         row = QHBoxLayout(self)
@@ -182,6 +215,18 @@ class CaptureScreen(QWidget):
         """Mark the sides that are captured already."""
         for i, view in enumerate(VIEWS):
             self.views.button(i).setIcon(icon("check", palette.GREEN) if view in views else QIcon())
+        left = [view for view in VIEWS if view not in views]
+        self._next = left[0] if left and views and self.view_label.isVisibleTo(self) else ""
+        self.next_view.setVisible(bool(self._next) and self._next != self.view)
+        if self._next:
+            self.next_view.setIcon(icon("next", palette.ACCENT))
+            self.next_view.setText(f" {TURNS[self._next]}")
+
+    @Slot()
+    def _go_to_next_view(self) -> None:
+        if self._next:
+            self.set_view(self._next)
+            self.pose_changed.emit()
 
     def offer_live(self, on: bool) -> None:
         """Whether the user may look through the camera although there is a capture to show."""
@@ -222,17 +267,30 @@ class CaptureScreen(QWidget):
     def show_preview(self) -> None:
         """Show what the camera sees."""
         self._live = True
+        self._pictures.setCurrentWidget(self.live_view)
         self._on_camera()
+
+    def _show_photo(self) -> None:
+        self._live = False
+        self._pictures.setCurrentWidget(self.photo)
+        self.strip.hide()
+        self.controls.hide()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102
+        if event.key() == Qt.Key.Key_Escape:
+            self.escaped.emit()
+        else:
+            super().keyPressEvent(event)
 
     def show_capture(self, analysed: AnalysedCapture | None, caption: str) -> None:
         """Show a capture with its joints instead of the camera's picture."""
-        self._live = False
+        self._show_photo()
         self.photo.set_image(None if analysed is None else joints_picture(analysed))
         self.caption.setText(caption)
 
     def show_plain(self, image: QImage, caption: str) -> None:
         """Show a stored picture whose analysis is not in memory."""
-        self._live = False
+        self._show_photo()
         self.photo.set_image(image)
         self.caption.setText(caption)
 
@@ -240,16 +298,6 @@ class CaptureScreen(QWidget):
     def live(self) -> bool:
         """Whether the camera's picture is shown."""
         return self._live
-
-    @Slot(object)
-    def _on_frame(self, frame: PreviewFrame) -> None:
-        if self._live and self.isVisible():
-            picture = preview_picture(frame)
-            if picture is not None:
-                self.photo.set_image(picture)
-                self.caption.setText(
-                    "What the camera sees now. Colours and sharpness are better in the capture."
-                )
 
     # --- the camera ----------------------------------------------------------------------------------
 
@@ -275,16 +323,22 @@ class CaptureScreen(QWidget):
         simulated = deck.is_simulator
         self.stance_label.setVisible(simulated)
         self.stance_box.setVisible(simulated)
+        self.calibration.setText(deck.calibration)
+        self.calibration.setVisible(bool(deck.calibration))
+        live = self._live and deck.is_live
+        self.strip.setVisible(live)
+        self.controls.setVisible(live)
         if self._live:
             if deck.camera is None:
-                self.photo.set_image(None)
-            self.caption.setText(
-                "Opening the camera."
-                if deck.camera_id and deck.camera is None
-                else ""
-                if deck.camera is not None
-                else "Choose a camera or open a recording."
-            )
+                self.live_view.show_picture(None)
+                self.strip.show_guidance(None)
+            opening = bool(deck.camera_id) and deck.camera is None
+            notice = "Opening the camera." if opening else "Choose a camera or open a recording."
+            if deck.camera is not None:
+                notice = "Waiting for the first picture."
+            if self.live_view.image_size == (0, 0):
+                self.live_view.set_notice(notice)
+            self.caption.setText("" if deck.camera is not None else notice)
 
     @Slot(int)
     def _on_camera_chosen(self, index: int) -> None:

@@ -1,27 +1,56 @@
-"""What happens in steps 1 and 2: from the camera to a stored, analysed capture."""
+"""What happens in steps 1 and 2: from the camera to a judged, stored, analysed capture."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Slot
 
+from app.live import LiveStatus
 from app.tasks import TaskFailure
 from app.windows.visit.camera_deck import CameraDeck
 from app.windows.visit.capture_screen import CaptureScreen
 from app.windows.visit.host import VisitHost
+from app.windows.visit.live_assist import LiveAssist
+from app.windows.visit.live_ghost import ghost_name, ghost_outlines, ghost_record
+from app.windows.visit.live_verdict import verdict_picture
 from app.windows.visit.pictures import stored_picture
-from app.workflows.analysis import NewCapture, take
+from app.workflows.analysis import NewCapture, Role, take
 from app.workflows.search import SearchOutcome
 from app.workflows.table import Event, State
 from app.workflows.wording import when
 from core.progress import Progress, ScaledProgress
 
 if TYPE_CHECKING:
+    from core.guidance import CaptureQuality
     from core.records import CaptureRecord
 
 _STANCE_STATES = (State.STANCE, State.STANCE_CHECK, State.STANCE_DONE)
+_CANCEL = "Cancel (Esc)"
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A new capture and its verdict.
+
+    Attributes
+    ----------
+    new : NewCapture
+    quality : CaptureQuality
+    stored : int or None
+        Id of the capture if it was good enough to be stored at once.
+    """
+
+    new: NewCapture
+    quality: CaptureQuality
+    stored: int | None
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict's sentences, then what the skeleton has to say."""
+        return tuple(dict.fromkeys((*self.quality.sentences, *self.new.analysed.skeleton.warnings)))
 
 
 class CaptureSteps(QObject):
@@ -33,19 +62,31 @@ class CaptureSteps(QObject):
         self.deck = CameraDeck(host.context, self)
         self.stance = CaptureScreen("stance", self.deck)
         self.capture = CaptureScreen("capture", self.deck)
+        self.assist = LiveAssist(self.deck, self)
         self._current: CaptureScreen | None = None
         self._shown: tuple[object, ...] | None = None
+        self._pending: Judged | None = None
+        self._notes: dict[int, Judged] = {}
+        self._ghost_key: tuple[object, ...] | None = None
+        self._warned = False
         self.stance.set_stance("psi")
         self.stance.set_choices_visible(view=False)
         for screen in (self.stance, self.capture):
             screen.pose_changed.connect(self._on_pose)
-            screen.live_toggled.connect(self._on_live)
+            screen.live_toggled.connect(self.refresh)
+            screen.escaped.connect(self._on_escape)
+            screen.controls.automatic_toggled.connect(self._on_automatic)
+            screen.controls.ghost_changed.connect(self._on_ghost)
         self.stance.primary_clicked.connect(self._stance_primary)
         self.stance.secondary_clicked.connect(self._stance_secondary)
         self.capture.primary_clicked.connect(self._capture_primary)
-        self.capture.secondary_clicked.connect(self._take_working)
+        self.capture.secondary_clicked.connect(self._capture_secondary)
         self.deck.changed.connect(self.refresh)
         self.deck.failed.connect(self._on_camera_failed)
+        self.deck.status_changed.connect(self._on_status)
+        self.deck.came_back.connect(self._on_came_back)
+        self.assist.take.connect(self._take)
+        self.assist.phase_changed.connect(self.refresh)
 
     # --- what is shown -------------------------------------------------------------------------------
 
@@ -54,7 +95,7 @@ class CaptureSteps(QObject):
         screen = self.stance if state in _STANCE_STATES else self.capture
         if screen is not self._current:
             self._current = screen
-            self._shown = None
+            self._shown = self._pending = self._ghost_key = None
             screen.refresh_cameras()
             if not self.deck.camera_id:
                 self._choose_default()
@@ -64,22 +105,33 @@ class CaptureSteps(QObject):
     def leave(self) -> None:
         """Another step is shown: the camera may rest."""
         self._current = None
-        self.deck.look(False)
+        self.assist.attach(None)
 
     @Slot()
     def refresh(self) -> None:
         """Show the session's state on the current screen."""
-        if self._current is self.stance:
+        screen = self._current
+        if screen is None:
+            return
+        screen.controls.set_automatic(self.assist.assistant.automatic)
+        if self._pending is not None and not self.assist.busy:
+            self._show_pending(screen, self._pending)
+        elif screen is self.stance:
             self._show_stance()
-        elif self._current is self.capture:
+        else:
             self._show_capture()
+        if self.assist.counting:
+            screen.panel.primary.setText(_CANCEL)
+            screen.panel.primary.setEnabled(True)
+            screen.secondary.setVisible(False)
+            screen.live_view.setFocus()
 
     def _show_stance(self) -> None:
         session, screen = self._host.session, self.stance
         screen.panel.show_state(session.info)
         candidate = session.stance_candidate
         screen.corrections.show_list("Ask the patient", () if candidate is None else candidate.corrections)
-        ready = self.deck.camera is not None
+        ready = self.deck.ready
         screen.panel.primary.setEnabled(ready or session.state is State.STANCE_DONE)
         screen.secondary.setVisible(session.state is not State.STANCE)
         screen.secondary.setEnabled(ready or session.state is State.STANCE_CHECK)
@@ -91,7 +143,6 @@ class CaptureSteps(QObject):
             screen.secondary.setText("Capture again")
             self._show_record(screen, session.snapshot.stance)
         else:
-            screen.warnings.show_list("", ())
             self._show_live(screen)
 
     def _show_capture(self) -> None:
@@ -103,7 +154,7 @@ class CaptureSteps(QObject):
         if done:
             primary = f"Find {pending} lesion{'s'[: pending > 1]}" if pending else "Continue to lesions"
         screen.panel.show_state(session.info, primary)
-        ready = self.deck.camera is not None
+        ready = self.deck.ready
         screen.set_choices_visible(view=self.deck.camera is None or self.deck.kind != "folder")
         screen.show_taken(tuple(views))
         screen.panel.primary.setEnabled(done or ready)
@@ -114,43 +165,111 @@ class CaptureSteps(QObject):
         if done and taken is not None:
             self._show_record(screen, session.snapshot.captures[taken])
         else:
-            screen.warnings.show_list("", ())
             self._show_live(screen)
+
+    def _show_pending(self, screen: CaptureScreen, judged: Judged) -> None:
+        """The verdict of a capture that was not stored."""
+        refused = judged.quality.grade == "refused"
+        screen.panel.primary.setText("Capture again" if refused else "Use it")
+        screen.panel.primary.setEnabled(self.deck.ready or not refused)
+        screen.secondary.setVisible(not refused)
+        screen.secondary.setText("Capture again")
+        screen.secondary.setEnabled(self.deck.ready)
+        screen.corrections.show_list("", ())
+        screen.warnings.show_list("", ())
+        screen.verdict.show_quality(judged.quality, judged.sentences)
+
+        def show() -> None:
+            screen.show_plain(
+                verdict_picture(judged.new.analysed, judged.quality), "The capture. It is not saved yet."
+            )
+
+        self._show_once(screen, ("judged", id(judged)), show)
 
     def _show_live(self, screen: CaptureScreen) -> None:
         self._shown = None
+        screen.verdict.show_quality(None)
+        screen.warnings.show_list("", ())
         screen.offer_live(False)
+        self._look(screen)
+
+    def _look(self, screen: CaptureScreen) -> None:
         screen.show_preview()
-        self.deck.look(True)
+        self.assist.attach(screen, psi=screen is self.stance)
+        self._lay_ghost(screen)
 
     def _show_record(self, screen: CaptureScreen, record: CaptureRecord) -> None:
         session = self._host.session
         ready = session.is_ready(record.id)
+        judged = self._notes.get(record.id)
 
         def show() -> None:
             caption = f"Captured {when(record.taken_at)}, {record.frame_count} depth frames"
             if ready:
                 analysed = session.analysed(record.id)
                 seen, all_joints = len(analysed.skeleton.visible()), len(analysed.skeleton.joints)
-                screen.warnings.show_list("Please note", analysed.warnings)
                 screen.show_capture(analysed, f"{caption}. {seen} of {all_joints} joints seen.")
             else:
-                screen.warnings.show_list("", ())
                 screen.show_plain(stored_picture(session.store, record), caption)
 
+        if judged is not None:
+            screen.verdict.show_quality(judged.quality, judged.sentences)
+            screen.warnings.show_list("", ())
+        else:
+            screen.verdict.show_quality(None)
+            screen.warnings.show_list("Please note", session.analysed(record.id).warnings if ready else ())
         self._show_once(screen, (record.id, ready), show)
 
     def _show_once(self, screen: CaptureScreen, key: tuple[object, ...], show: Callable[[], None]) -> None:
         screen.offer_live(self.deck.camera is not None)
-        if screen.live_wanted:
+        if screen.live_wanted or self.assist.busy:
             self._shown = None
-            screen.show_preview()
-            self.deck.look(True)
+            self._look(screen)
             return
-        self.deck.look(False)
+        self.assist.attach(None)
         if self._shown != (screen, *key):
             self._shown = (screen, *key)
             show()
+
+    # --- the outline of an earlier view --------------------------------------------------------------
+
+    def _lay_ghost(self, screen: CaptureScreen) -> None:
+        """Find the outline of an earlier view once for each view and camera."""
+        session, camera = self._host.session, self.deck.camera
+        if camera is None or not self.deck.is_live:
+            return
+        role: Role = "psi" if screen is self.stance else "working"
+        view = "front" if screen is self.stance else screen.view
+        record = ghost_record(session.snapshot, role, view)
+        key = (screen, self.deck.camera_id, id(camera), None if record is None else record.id)
+        if key == self._ghost_key:
+            return
+        self._ghost_key = key
+        screen.live_view.set_ghost(None)
+        screen.controls.offer_ghost("" if record is None else ghost_name(session.snapshot, record))
+        if record is None:
+            return
+        capture_id, rig, store = record.id, camera.rig, session.store
+        task = self._host.context.tasks.start(
+            "Drawing the outline", lambda progress: ghost_outlines(store, capture_id, rig)
+        )
+
+        def laid(outlines: Any) -> None:
+            if self._ghost_key == key:
+                screen.live_view.set_ghost(outlines)
+                self._on_ghost()
+
+        def missing(failure: TaskFailure) -> None:
+            if self._ghost_key == key:
+                screen.controls.offer_ghost("")
+
+        task.finished.connect(laid)
+        task.failed.connect(missing)
+
+    @Slot()
+    def _on_ghost(self) -> None:
+        for screen in (self.stance, self.capture):
+            screen.live_view.set_ghost_opacity(screen.controls.ghost_opacity)
 
     # --- the camera ----------------------------------------------------------------------------------
 
@@ -167,11 +286,8 @@ class CaptureSteps(QObject):
     @Slot()
     def _on_pose(self) -> None:
         self._stand()
-        self.refresh()
-
-    @Slot()
-    def _on_live(self) -> None:
-        self.refresh()
+        if self._pending is None:
+            self.refresh()
 
     def _stand(self) -> None:
         if self._current is not None:
@@ -185,20 +301,48 @@ class CaptureSteps(QObject):
             failure.message, failure.advice or "Choose another camera, capture folder or recording."
         )
 
+    @Slot(object)
+    def _on_status(self, status: LiveStatus) -> None:
+        if status.kind in ("stalled", "gone"):
+            self._warned = True
+            self._host.banner.show_error(status.message, status.advice)
+        elif status.kind == "streaming" and self._warned:
+            self._on_came_back()
+        self.refresh()
+
+    @Slot()
+    def _on_came_back(self) -> None:
+        if self._warned:
+            self._warned = False
+            self._host.banner.show_success("The camera is back.", "Everything of the visit is still here.")
+
+    @Slot(bool)
+    def _on_automatic(self, on: bool) -> None:
+        self.assist.set_automatic(on)
+
+    @Slot()
+    def _on_escape(self) -> None:
+        if self.assist.cancel():
+            self._host.banner.show_info("Cancelled. No capture was taken.")
+
     # --- capturing -----------------------------------------------------------------------------------
 
     @Slot()
     def _stance_primary(self) -> None:
         session = self._host.session
-        if session.state is State.STANCE_DONE:
+        if self._answer_pending(primary=True):
+            return
+        if session.state is State.STANCE_DONE and not self.assist.counting:
             self._host.attempt(lambda: session.fire(Event.GO_CAPTURE))
         else:
-            self._take_stance()
+            self._begin()
 
     @Slot()
     def _stance_secondary(self) -> None:
         session = self._host.session
         candidate = session.stance_candidate
+        if self._answer_pending(primary=False):
+            return
         if session.state is State.STANCE_CHECK and candidate is not None:
             self._host.run(
                 "Saving the capture",
@@ -206,31 +350,24 @@ class CaptureSteps(QObject):
                 lambda _: session.adopt_accepted_stance(),
             )
         else:
-            self._take_stance()
-
-    def _take_stance(self) -> None:
-        camera, session, frames = self.deck.camera, self._host.session, self._host.frames
-        if camera is None:
-            self._host.banner.show_warning("No camera is open.", "Choose a camera or open a recording.")
-            return
-
-        def work(progress: Progress) -> NewCapture:
-            capture = take(
-                camera, view=None, stance="psi", frames=frames, progress=ScaledProgress(progress, 0.0, 0.4)
-            )
-            return session.take_stance(capture, ScaledProgress(progress, 0.4, 1.0))
-
-        self._host.run("Capturing the stance", work, session.adopt_stance)
+            self._begin()
 
     @Slot()
     def _capture_primary(self) -> None:
         session = self._host.session
-        if session.state is State.CAPTURE:
-            self._take_working()
+        if self._answer_pending(primary=True):
+            return
+        if session.state is State.CAPTURE or self.assist.counting:
+            self._begin()
         elif session.pending_count:
             self._host.run("Finding the lesions", session.find_lesions, self._found)
         else:
             self._host.attempt(lambda: session.fire(Event.GO_LESIONS))
+
+    @Slot()
+    def _capture_secondary(self) -> None:
+        if not self._answer_pending(primary=False):
+            self._begin()
 
     def _found(self, outcome: SearchOutcome) -> None:
         session = self._host.session
@@ -238,28 +375,95 @@ class CaptureSteps(QObject):
         if outcome.warnings:
             self._host.banner.show_warning(outcome.warnings[0], " ".join(outcome.warnings[1:]))
 
-    @Slot()
-    def _take_working(self) -> None:
-        camera, session, frames = self.deck.camera, self._host.session, self._host.frames
-        if camera is None:
-            self._host.banner.show_warning("No camera is open.", "Choose a camera or open a recording.")
-            return
-        view = None if self.deck.kind == "folder" else self.capture.view
-        stance = self.capture.stance if self.deck.is_simulator else None
+    def _answer_pending(self, *, primary: bool) -> bool:
+        """The buttons under a verdict; False if there is none."""
+        judged = self._pending
+        if judged is None or self.assist.busy:
+            return False
+        if primary and judged.quality.grade != "refused":
+            self._use(judged)
+        else:
+            self._pending = None
+            self._begin()
+        return True
 
-        def work(progress: Progress) -> NewCapture:
+    def _use(self, judged: Judged) -> None:
+        session = self._host.session
+
+        def adopt(record: CaptureRecord) -> None:
+            self._pending = None
+            self._adopt(Judged(judged.new, judged.quality, record.id))
+
+        self._host.run(
+            "Saving the capture", lambda progress: session.store_capture(judged.new, progress), adopt
+        )
+
+    def _begin(self) -> None:
+        """Count down before a live camera, capture at once from a recording; a second press stops it."""
+        if self.deck.camera is None:
+            self._host.banner.show_warning("No camera is open.", "Choose a camera or open a recording.")
+        elif self.deck.is_live and self.deck.kind != "recording":
+            self._host.banner.clear()
+            self.assist.press()
+        else:
+            self._take()
+
+    @Slot()
+    def _take(self) -> None:
+        camera, session, frames = self.deck.camera, self._host.session, self._host.frames
+        screen = self._current
+        if camera is None or screen is None:
+            self.assist.done()
+            return
+        role: Role = "psi" if screen is self.stance else "working"
+        view = None if role == "psi" or self.deck.kind == "folder" else screen.view
+        stance = "psi" if role == "psi" else screen.stance if self.deck.is_simulator else None
+        strict = self.deck.is_live and self.deck.kind != "recording"
+
+        def work(progress: Progress) -> Judged:
+            from core.guidance import judge_capture
+
             capture = take(
                 camera, view=view, stance=stance, frames=frames, progress=ScaledProgress(progress, 0.0, 0.4)
             )
-            return session.take_working(capture, ScaledProgress(progress, 0.4, 1.0))
+            new = session.analyse(capture, role, ScaledProgress(progress, 0.4, 0.85))
+            quality = judge_capture(new.analysed)
+            # a recording cannot be taken again: only what is useless is asked about
+            fine = quality.grade == "good" or (quality.grade == "usable" and not strict)
+            if not (fine and new.good):
+                return Judged(new, quality, None)
+            record = session.store_capture(new, ScaledProgress(progress, 0.85, 1.0))
+            return Judged(new, quality, record.id)
 
-        self._host.run("Capturing the body", work, self._adopt_working)
+        title = "Capturing the stance" if role == "psi" else "Capturing the body"
+        self._host.run(title, work, self._on_judged, stopped=self._on_stopped)
 
-    def _adopt_working(self, new: NewCapture) -> None:
-        self.capture.stop_live()
-        self.capture.set_view(new.analysed.capture.view)
-        self._host.session.adopt_working(new)
+    def _on_stopped(self) -> None:
+        self.assist.done()
+        self._host.banner.show_info("Cancelled. Nothing was changed.")
+
+    def _on_judged(self, judged: Judged) -> None:
+        self.assist.done()
+        screen = self._current
+        if screen is not None:
+            screen.stop_live()
+        if judged.stored is not None or not judged.new.good:
+            self._adopt(judged)
+        else:
+            self._pending = judged
+            self.refresh()
+
+    def _adopt(self, judged: Judged) -> None:
+        session = self._host.session
+        if judged.stored is not None:
+            self._notes[judged.stored] = judged
+        if judged.new.role == "psi":
+            session.adopt_stance(judged.new)
+        else:
+            self.capture.set_view(judged.new.analysed.capture.view)
+            session.adopt_working(judged.new)
 
 
 def _show_new(screen: CaptureScreen, new: NewCapture) -> None:
+    screen.verdict.show_quality(None)
     screen.show_capture(new.analysed, "The capture with the joints found in it. It is not saved yet.")

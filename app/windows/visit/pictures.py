@@ -15,7 +15,6 @@ from app.widgets.images import to_qimage
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture
     from core.records import CaptureRecord, ClinicStore
-    from devices.camera import PreviewFrame
 
 _NEAR_M, _FAR_M = 0.6, 4.0
 _USUAL_UNIT_M = 0.001
@@ -27,13 +26,6 @@ def depth_picture(depth_m: NDArray[np.float32] | NDArray[np.float64]) -> NDArray
     near = np.clip((_FAR_M - depth) / (_FAR_M - _NEAR_M), 0.0, 1.0)
     grey = np.where(depth > 0, 40 + 200 * near, 20).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
-
-
-def preview_picture(frame: PreviewFrame) -> QImage | None:
-    """What the camera sees now: its colour picture, else its depth."""
-    if frame.rgb is not None:
-        return to_qimage(frame.rgb)
-    return None if frame.depth_m is None else to_qimage(depth_picture(frame.depth_m))
 
 
 def capture_picture(analysed: AnalysedCapture) -> NDArray[np.uint8]:
