@@ -103,7 +103,8 @@ def measure_sensors(
                 skins.measure(once, name)
     bodies = len({pair.shape for pair in pairs})
     about = {
-        "captures": f"simulated, {split} split, {len(pairs)} pairs of {bodies} bodies, each with every sensor",
+        "captures": f"simulated, {split} split, {len(pairs)} pairs of {bodies} bodies, each pair with "
+        "every sensor",
         **what_was_run(rungs, started),
     }
     rows = sensor_rows(records, rungs)

@@ -170,6 +170,7 @@ _KIND_OF: dict[Principle, str] = {
 
 class _Smoothing(_Strict):
     window_px: Annotated[float, Field(gt=0, le=8, allow_inf_nan=False)]
+    passes: Annotated[int, Field(ge=1, le=3)] = 1
     gate_m: Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)]
     gate_sigmas: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = 0.0
     trim_px: Annotated[int, Field(ge=0, le=5)] = 0

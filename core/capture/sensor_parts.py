@@ -94,6 +94,8 @@ class Smoothing:
     ----------
     window_px : float
         Standard deviation of the window, in depth pixels.
+    passes : int
+        How often: the second pass is gated by what the first one smoothed, not by the noise itself.
     gate_m : float
         Neighbours that differ by more belong to something else; at least so much.
     gate_sigmas : float
@@ -103,6 +105,7 @@ class Smoothing:
     """
 
     window_px: float = 1.5
+    passes: int = 1
     gate_m: float = 0.020
     gate_sigmas: float = 0.0
     trim_px: int = 0
@@ -313,7 +316,7 @@ class SensorModel:
         Smoothing takes off what varies within its window: all but a little of the noise between frames,
         and that part of the systematic error that is no wider than the window.
         """
-        window = self.smoothing.window_px
+        window = self.smoothing.window_px * np.sqrt(self.smoothing.passes)
         random = self.axial_sigma(z_m) / np.sqrt(max(frames, 1)) / (2.0 * np.sqrt(np.pi) * max(window, 0.5))
         return np.asarray(np.hypot(random, self.systematic.sigma(z_m, self, window)))
 

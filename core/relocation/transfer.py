@@ -24,7 +24,9 @@ FloatArray = NDArray[np.float64]
 ROUNDS = 2
 """Matching and registering in turn; a third changed nothing on the tuning pairs."""
 DRIFT_M = {False: 0.0045, True: 0.007}
-"""What the registration leaves along the skin, in the same stance and in another (METHOD section 3)."""
+"""What the registration leaves along the skin, in the same stance and in another (METHOD section 3).
+
+Depth noisier than a Kinect v1's pulls it as much farther astray."""
 OFF_M = 0.010
 MOST_DOUBT = 4.0
 """A place that was carried off the seen skin drifted the more, up to so many times."""
@@ -97,8 +99,9 @@ def transfer_skin(
         with context.clock.phase("spots"):
             first_spots, spots = usable(pair.first.spots), usable(pair.followup.spots)
     with context.clock.phase("matching"):
+        drift = float(np.hypot(DRIFT_M[other], np.sqrt(pair.depth_excess_m2)))
         moles = gather_moles(lesions, context.known, first_spots, pair.first.scan.surface, registration.start)
-        engine = _Matcher(pair, registration, moles, spots, moles.looks(first_spots, spots), DRIFT_M[other])
+        engine = _Matcher(pair, registration, moles, spots, moles.looks(first_spots, spots), drift)
         engine.hold(lesions, context)
         for turn in range(ROUNDS if len(spots) else 0):
             context.progress(0.5 + 0.2 * turn, "Matching the moles of both visits")

@@ -88,9 +88,10 @@ def scan_body(capture: RgbdCapture, *, progress: Progress = no_progress) -> Body
     mask = segment_body(fused.depth_m, camera)
     progress(0.6, "Smoothing the skin")
     raw = np.where(_trimmed(mask.mask, sensor.smoothing.trim_px), fused.depth_m, 0.0)
-    smooth = denoise_depth(
-        raw, sigma_px=sensor.smoothing.window_px, gate_m=denoising_gate(sensor, raw, fused.frames)
-    )
+    gate = denoising_gate(sensor, raw, fused.frames)
+    smooth = raw
+    for _ in range(sensor.smoothing.passes):
+        smooth = denoise_depth(smooth, sigma_px=sensor.smoothing.window_px, gate_m=gate)
     progress(0.8, "Building the surface")
     surface = BodySurface.from_depth(smooth, camera)
     noise = _noise(fused, raw)
