@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from PySide6.QtCore import QObject, Signal
 
+from app.lasting_none import keep_none
 from app.paths import calibration_dir
 from app.settings import Settings, read_settings, write_settings
 from app.tasks import TaskRunner
@@ -142,6 +143,7 @@ class AppContext(QObject):
         method: str | None = None,
         parent: QObject | None = None,
     ) -> None:
+        keep_none()
         super().__init__(parent)
         self.store = store
         self.data_dir = data_dir
