@@ -278,6 +278,31 @@ class _Patches:
         )
 
 
+class SkinUnder:
+    """Where a joint could be under a pixel of the picture.
+
+    Parameters
+    ----------
+    rig : CameraRig
+    surface : BodySurface
+    """
+
+    def __init__(self, rig: CameraRig, surface: BodySurface) -> None:
+        self._sight = Sight.of(rig, "color")
+        self._patches = _Patches(self._sight, surface)
+
+    def layers(self, name: str, pixel: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Joint centres (k, 3) behind each layer of skin under a pixel, and the layers' shares (k,).
+
+        Empty if the pixel is not on the body, or farther than `REACH_M` beside its outline.
+        """
+        percentile = NECK_PERCENTILE if name == "neck" else PERCENTILE
+        spot = self._patches.spot(pixel, 1.0, percentile)
+        if spot.visibility == 0.0:
+            return np.zeros((0, 3)), np.zeros(0)
+        return self._sight.points(pixel, spot.depths + interior_m(name)), spot.shares
+
+
 def _plausible_limb(
     limb: tuple[str, str, str], spots: dict[str, _Spot], sight: Sight, chosen: dict[str, int]
 ) -> dict[str, int]:
@@ -289,8 +314,8 @@ def _plausible_limb(
     best = (np.inf, 0, 0)
     for i, k in product(range(len(knots)), range(len(ends))):
         cost = (
-            _length_cost(middle, float(np.linalg.norm(knots[i] - root)))
-            + _length_cost(far, float(np.linalg.norm(ends[k] - knots[i])))
+            bone_cost(middle, float(np.linalg.norm(knots[i] - root)))
+            + bone_cost(far, float(np.linalg.norm(ends[k] - knots[i])))
             - np.log(spots[middle].shares[i])
             - np.log(spots[far].shares[k])
         )
@@ -330,7 +355,8 @@ def _proportioned(
     return _Spot(pixel, spot.visibility, np.array([np.percentile(patch, PERCENTILE)]), np.ones(1))
 
 
-def _length_cost(end: str, length: float) -> float:
+def bone_cost(end: str, length: float) -> float:
+    """How impossible a length (metres) is for the bone that ends in this joint of a limb; 0 if possible."""
     low, high = BONE_RANGE_M[end.split("_")[1]]
     outside = max(low - length, length - high, 0.0)
     return (outside / 0.03) ** 2

@@ -129,4 +129,7 @@ def project_to_skin(skeleton: Skeleton, surface: BodySurface) -> AnchorSet:
 def _anchor(joint: Joint, point: SurfacePoint) -> Anchor:
     gap = float(np.linalg.norm(point.position_m - joint.point_m))
     reliable = joint.visibility >= VISIBLE and gap < REACH_M + interior_m(joint.name)
-    return Anchor(joint.name, point, point.position_m, anchor_sigma_m(joint.name, joint.visibility), reliable)
+    sigma = anchor_sigma_m(joint.name, joint.visibility)
+    if joint.source == "hand" and joint.sigma_m is not None:
+        sigma = min(sigma, joint.sigma_m)
+    return Anchor(joint.name, point, point.position_m, sigma, reliable)
