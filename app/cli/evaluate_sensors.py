@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from devices.simulator import SimulatedCapture
     from devices.simulator.cases import SimulatedPair
 
-METHODS = "trilateration,registration,fused"
+METHODS = "trilateration,fused"
 _LEAST_PATH_M, _FAR_OFF_M = 0.05, 0.10
 _MOST_SOURCES = 12
 

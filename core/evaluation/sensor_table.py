@@ -51,6 +51,33 @@ class SkinError:
 
 
 @dataclass(frozen=True)
+class PathErrors:
+    """How far shortest paths on measured skins are from the true ones."""
+
+    paths: int
+    mean_mm: float
+    p95_mm: float
+    share: float
+    bias: float
+
+
+def path_errors(skins: Sequence[Mapping[str, Any]], sensor: str) -> PathErrors | None:
+    """Over all paths of a sensor, from `SkinError.to_json`; None without any. Shares are of the length."""
+    own = [skin for skin in skins if skin["sensor"] == sensor]
+    length = np.array([x for skin in own for x in skin["lengths_mm"]])
+    error = np.array([x for skin in own for x in skin["errors_mm"]])
+    if len(length) == 0:
+        return None
+    return PathErrors(
+        len(length),
+        float(np.abs(error).mean()),
+        float(np.percentile(np.abs(error), 95)),
+        float(np.abs(error / length).mean()),
+        float((error / length).mean()),
+    )
+
+
+@dataclass(frozen=True)
 class SensorRow:
     """One rung with one sensor in one stance class."""
 
@@ -153,21 +180,20 @@ def _skin_table(models: Sequence[SensorModel], skins: Sequence[SkinError]) -> li
         own = [skin for skin in skins if skin.sensor == model.name]
         if not own:
             continue
-        length = np.concatenate([skin.lengths_mm for skin in own])
-        error = np.concatenate([skin.errors_mm for skin in own])
+        paths = path_errors([skin.to_json() for skin in own], model.name)
         depth = float(np.sqrt(np.mean([skin.depth_mm**2 for skin in own])))
         normal = float(np.mean([skin.normal_deg for skin in own]))
-        cells = [model.name, f"{len(own)}", f"{depth:.1f} mm", f"{normal:.1f} deg", f"{len(length)}"]
-        if len(length):
-            share = error / length
-            cells += [
-                f"{np.abs(error).mean():.1f} mm",
-                f"{np.percentile(np.abs(error), 95):.1f} mm",
-                f"{100 * np.abs(share).mean():.2f} %",
-                f"{100 * share.mean():+.2f} %",
-            ]
+        cells = [model.name, f"{len(own)}", f"{depth:.1f} mm", f"{normal:.1f} deg"]
+        if paths is None:
+            cells += ["0", *["-"] * 4]
         else:
-            cells += ["-"] * 4
+            cells += [
+                f"{paths.paths}",
+                f"{paths.mean_mm:.1f} mm",
+                f"{paths.p95_mm:.1f} mm",
+                f"{100 * paths.share:.2f} %",
+                f"{100 * paths.bias:+.2f} %",
+            ]
         out.append("| " + " | ".join(cells) + " |")
     return out
 
