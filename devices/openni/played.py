@@ -83,6 +83,8 @@ class PlayedCamera:
     def _known(self) -> SourceFacts:
         if self._facts is None:
             self._facts = self._source.facts()
+            if self._thread is None:
+                self._source.close()
         return self._facts
 
     @property

@@ -113,9 +113,8 @@ class OniRecording:
         """When the file was written."""
         return datetime.fromtimestamp(self._path.stat().st_mtime, UTC)
 
-    @property
-    def rig(self) -> CameraRig:
-        """Geometry of the frames as `frames` gives them, not mirrored."""
+    def frame_rig(self) -> CameraRig:
+        """Geometry of the frames as `frames` gives them, not mirrored. Opens the recording."""
         rig = self._rig()
         if not self._mirrored:
             return rig

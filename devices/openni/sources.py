@@ -98,7 +98,7 @@ class OniSource:
         profile = recording.profile
         return SourceFacts(
             recording.info.name,
-            recording.rig,
+            recording.frame_rig(),
             recording.sensor,
             None if profile is None else profile.document(),
             recording.depth_corrected,
