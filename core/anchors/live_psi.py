@@ -87,9 +87,10 @@ def _with_depth_guessed(report: PsiReport, flat: Skeleton, trunk: float) -> PsiR
             return PsiReport(False, (turn, *say))
     for side in ("left", "right"):
         elbow = f"{side}_elbow"
-        if flat.sees(elbow, f"{side}_shoulder") and not any(f"{side} elbow" in words for words in say):
+        if flat.sees(elbow, f"{side}_shoulder"):
             upper = float(np.linalg.norm(flat.point(elbow) - flat.point(f"{side}_shoulder")))
-            if upper < _SHORT * trunk:
+            if upper < _SHORT * trunk:  # its direction in the picture then means nothing
+                say = [words for words in say if f"{side} elbow" not in words]
                 say.append(f"Move the {side} elbow out to the side.")
     return PsiReport(not say, tuple(say))
 
