@@ -26,6 +26,7 @@ COMMAND_MODULES = (
     "app.cli.records",
     "app.cli.evaluate",
     "app.cli.devices",
+    "app.cli.calibrate",
     "app.cli.record",
     "app.cli.play",
     "app.cli.capture",

@@ -1,20 +1,20 @@
 """Calibrating a rig: collects views of the board from a live camera, solves, judges, keeps the profile.
 
-Without any window; the wizard and ``geoderm calibrate`` both drive it. One thread at a time may use a session.
+Without any window; the wizard and ``geoderm calibrate`` both drive it. One thread at a time may use a
+session.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
-from core.calibration.board import BoardSpec, BoardView, detect_board
-from core.calibration.coverage import CameraCoverage, camera_coverage
+from app.workflows.calibration_steps import CalibrationResult, Coverage, Outcome, Step
+from core.calibration.board import BoardSpec, BoardView, detect_board, follow_board
+from core.calibration.coverage import camera_coverage
 from core.calibration.lens import LENS_MODELS, fit_lens
 from core.calibration.profile import CalibrationProfile, ProfileStore
-from core.calibration.solve import BOARD_SIGMA, RigSolution, ViewResidual, solve_rig
-from core.calibration.verdict import Verdict, judge
+from core.calibration.solve import BOARD_SIGMA, solve_rig
+from core.calibration.verdict import judge
 from core.calibration.views import RigView, is_blurred, is_like, is_moving, view_of
 from core.errors import WorkError
 from core.progress import Progress, no_progress
@@ -26,93 +26,9 @@ LEAST_TO_SOLVE = 6
 _ENOUGH_SHARE = 0.8
 _STILL_FOR_S = 0.25
 _SWITCH_TIMEOUT_S = 8.0
+_REPEAT_S = 0.5
 _RMS_FROM_VIEWS = 5
 _RMS_AT_MOST_VIEWS = 12
-
-
-class Outcome(Enum):
-    """What became of a frame."""
-
-    NOTHING = "nothing"
-    """No board in sight."""
-    REFUSED = "refused"
-    """The board was seen, but this view is not worth keeping; the message says why."""
-    HOLD = "hold"
-    """Good so far: hold still a moment longer."""
-    ADDED = "added"
-    """A view was added."""
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What happened to one frame.
-
-    Attributes
-    ----------
-    outcome : Outcome
-    message : str
-        For the person with the board.
-    infrared, color : BoardView or None
-        Corners found in this frame, to draw over the pictures.
-    """
-
-    outcome: Outcome
-    message: str
-    infrared: BoardView | None = None
-    color: BoardView | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Coverage:
-    """Coverage of both cameras.
-
-    Attributes
-    ----------
-    infrared : CameraCoverage
-    color : CameraCoverage or None
-        None for a rig without a colour camera.
-    """
-
-    infrared: CameraCoverage
-    color: CameraCoverage | None
-
-    @property
-    def cameras(self) -> list[CameraCoverage]:
-        """Of the cameras there are."""
-        return [self.infrared] if self.color is None else [self.infrared, self.color]
-
-    @property
-    def share(self) -> float:
-        """How much of what is wanted is there, 0 to 1."""
-        return min(c.share for c in self.cameras)
-
-    def missing(self) -> list[str]:
-        """What to ask for, most important first."""
-        return list(dict.fromkeys(text for pair in _zip(self.cameras) for text in pair))
-
-
-def _zip(cameras: Sequence[CameraCoverage]) -> list[list[str]]:
-    lists = [c.missing() for c in cameras]
-    return [[part[k] for part in lists if k < len(part)] for k in range(max(map(len, lists), default=0))]
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationResult:
-    """Outcome of `CalibrationSession.solve`.
-
-    Attributes
-    ----------
-    profile : CalibrationProfile
-        Not saved yet.
-    verdict : Verdict
-    views : tuple of ViewResidual
-    solution : RigSolution
-    """
-
-    profile: CalibrationProfile
-    verdict: Verdict
-    views: tuple[ViewResidual, ...]
-    solution: RigSolution
 
 
 @dataclass
@@ -153,6 +69,8 @@ class CalibrationSession:
         Views to collect.
     board_sigma : float
         Relative uncertainty of the board's measured size.
+    repeats : bool
+        Take views of the same place too, half a second apart: for the daily check.
     """
 
     identity: CameraIdentity
@@ -161,11 +79,13 @@ class CalibrationSession:
     color: bool = True
     wanted: int = WANTED_VIEWS
     board_sigma: float = BOARD_SIGMA
+    repeats: bool = False
     _views: list[RigView] = field(default_factory=list)
     _seen: dict[str, _Seen] = field(default_factory=lambda: {"infrared": _Seen(), "color": _Seen()})
     _pair: _Pair | None = None
     _rms: dict[str, float] = field(default_factory=dict)
     _coverage: Coverage | None = None
+    _added_s: float = float("-inf")
 
     @property
     def views(self) -> tuple[RigView, ...]:
@@ -281,7 +201,7 @@ class CalibrationSession:
 
     def _find(self, frame: LiveFrame, kind: str) -> BoardView | None:
         image = frame.infrared if kind == "infrared" else frame.rgb
-        return None if image is None else detect_board(image, self.spec)
+        return None if image is None else follow_board(image, self.spec, self._seen[kind].view)
 
     def _stillness(
         self, frame: LiveFrame, infrared: BoardView | None, color: BoardView | None
@@ -308,17 +228,23 @@ class CalibrationSession:
             return f"Too little of the board is in the {name} picture."
         return ""
 
-    def _repeated(self, infrared: BoardView | None, color: BoardView | None) -> bool:
-        """Whether there is a view like this already."""
+    def _repeated(
+        self, frame: LiveFrame, infrared: BoardView | None, color: BoardView | None
+    ) -> tuple[Outcome, str] | None:
+        """What to say where there is a view like this already."""
+        if self.repeats:
+            soon = frame.time_s - self._added_s < _REPEAT_S
+            return (Outcome.HOLD, "Good. Move the board a little, then hold it still.") if soon else None
         for view in self._views:
-            if infrared is not None and view.infrared is not None:
-                if is_like(infrared, view.infrared, self.spec):
-                    return True
-            elif color is not None and view.color is not None and is_like(color, view.color, self.spec):
-                return True
-        return False
+            pairs = ((infrared, view.infrared), (color, view.color))
+            a, b = next(((a, b) for a, b in pairs if a is not None and b is not None), (None, None))
+            if a is not None and b is not None and is_like(a, b, self.spec):
+                return Outcome.REFUSED, f"There is a view like this already. {self._next_wish()}"
+        return None
 
     def _next_wish(self) -> str:
+        if self.repeats:
+            return "Move the board to another place and hold it still."
         missing = self.missing()
         return f"{missing[0]}." if missing else "Move on to another place, distance or tilt."
 
@@ -329,20 +255,29 @@ class CalibrationSession:
             return Step(outcome, message, infrared, color)
 
         if infrared is None and color is None:
-            return told(Outcome.NOTHING, "Hold the board where both cameras see it." if self.color else "Hold the board before the camera.")
+            return told(
+                Outcome.NOTHING,
+                "Hold the board where both cameras see it."
+                if self.color
+                else "Hold the board before the camera.",
+            )
         if infrared is None:
-            return told(Outcome.REFUSED, "Only the colour camera sees the board: come closer, or toward the middle.")
+            return told(
+                Outcome.REFUSED, "Only the colour camera sees the board: come closer, or toward the middle."
+            )
         if self.color and color is None:
-            return told(Outcome.REFUSED, "Only the infrared camera sees the board: come closer, or toward the middle.")
-        if self._repeated(infrared, color):
-            return told(Outcome.REFUSED, f"There is a view like this already. {self._next_wish()}")
+            return told(
+                Outcome.REFUSED, "Only the infrared camera sees the board: come closer, or toward the middle."
+            )
+        if why_not := self._repeated(frame, infrared, color):
+            return told(*why_not)
         for kind, view, name in (("infrared", infrared, "infrared"), ("color", color, "colour")):
             if view is not None and (why := self._unfit(view, still[kind], name)):
                 return told(Outcome.REFUSED, why)
         waited = min(still["infrared"], still["color"] if self.color else still["infrared"])
         if waited < _STILL_FOR_S:
             return told(Outcome.HOLD, "Good. Hold still.")
-        self._add(view_of(infrared, color, frame.depth, frame.depth_unit_m))
+        self._add(view_of(infrared, color, frame.depth, frame.depth_unit_m), frame)
         return told(Outcome.ADDED, f"View {len(self._views)} of {self.wanted}. {self._next_wish()}")
 
     def _alternating(
@@ -354,14 +289,17 @@ class CalibrationSession:
         pair = self._pair
         if pair is not None and frame.time_s - pair.begun_s > _SWITCH_TIMEOUT_S:
             self._pair = None
-            return told(Outcome.REFUSED, "The board was not seen by both cameras in time. Lean it on something and try again.")
+            return told(
+                Outcome.REFUSED,
+                "The board was not seen by both cameras in time. Lean it on something and try again.",
+            )
         if pair is None:
             if frame.rgb is None:
                 return told(Outcome.HOLD, "Wait for the colour picture.")
             if color is None:
                 return told(Outcome.NOTHING, "Hold the board before the colour camera.")
-            if self._repeated(None, color):
-                return told(Outcome.REFUSED, f"There is a view like this already. {self._next_wish()}")
+            if why_not := self._repeated(frame, None, color):
+                return told(*why_not)
             if why := self._unfit(color, still["color"], "colour"):
                 return told(Outcome.REFUSED, why)
             if still["color"] < _STILL_FOR_S:
@@ -384,12 +322,14 @@ class CalibrationSession:
         self._pair = None
         if is_moving(color, pair.color):
             return told(Outcome.REFUSED, "The board moved while the camera changed. Lean it on something.")
-        self._add(view_of(pair.infrared, pair.color, pair.frame.depth, pair.frame.depth_unit_m))
+        self._add(view_of(pair.infrared, pair.color, pair.frame.depth, pair.frame.depth_unit_m), frame)
         return told(Outcome.ADDED, f"View {len(self._views)} of {self.wanted}. {self._next_wish()}")
 
-    def _add(self, view: RigView) -> None:
+    def _add(self, view: RigView, frame: LiveFrame) -> None:
         self.add_view(view)
-        self._update_rms()
+        self._added_s = frame.time_s
+        if not self.repeats:
+            self._update_rms()
 
     def _update_rms(self) -> None:
         """Quick calibration of each camera from an even choice of the views."""
@@ -426,3 +366,15 @@ def start_streams(camera: LiveCamera, *, color: bool = True) -> bool:
         camera.start(("depth", "color"))
         return False
     return True
+
+
+__all__ = [
+    "LEAST_TO_SOLVE",
+    "WANTED_VIEWS",
+    "CalibrationResult",
+    "CalibrationSession",
+    "Coverage",
+    "Outcome",
+    "Step",
+    "start_streams",
+]

@@ -86,7 +86,7 @@ class BoardSpec:
     def corners_m(self) -> FloatArray:
         """Inner corners (n, 3) in the board frame, row by row; their number is their id."""
         x, y = np.meshgrid(np.arange(1, self.squares_x), np.arange(1, self.squares_y))
-        return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1) * self.square_m
+        return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1).astype(float) * self.square_m
 
     @cached_property
     def outline_m(self) -> FloatArray:
@@ -185,14 +185,14 @@ class BoardView:
 
 
 def gray_picture(image: NDArray[Any]) -> NDArray[np.uint8]:
-    """8-bit grey (h, w) of an RGB, grey or 16-bit infrared picture; infrared is stretched to its range."""
+    """8-bit grey (h, w) of an RGB, grey or 16-bit infrared picture, which is stretched to its range."""
     if image.ndim == 3:
         return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
     if image.dtype == np.uint8:
         return np.asarray(image)
     low, high = np.percentile(image[::4, ::4], [0.5, 99.5])
     scaled = (image.astype(np.float32) - low) * (255.0 / max(float(high - low), 1.0))
-    return np.clip(scaled, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(scaled, 0, 255), np.uint8)
 
 
 def detect_board(image: NDArray[Any], spec: BoardSpec, *, thorough: bool = False) -> BoardView | None:
@@ -235,3 +235,22 @@ def detect_board(image: NDArray[Any], spec: BoardSpec, *, thorough: bool = False
     if fitted is None or len(fitted[0]) < _MIN_CORNERS:
         return None
     return BoardView(fitted[0], fitted[1], (width, height), fitted[2])
+
+
+def follow_board(image: NDArray[Any], spec: BoardSpec, before: BoardView | None) -> BoardView | None:
+    """Find the board where it was in the frame before, which is quicker, or else anywhere.
+
+    Parameters
+    ----------
+    before : BoardView or None
+        The board in an earlier picture of the same camera.
+    """
+    from core.calibration.corner_fit import fit_corners
+
+    gray = gray_picture(image)
+    size = (gray.shape[1], gray.shape[0])
+    if before is not None and before.size == size:
+        fitted = fit_corners(gray, spec, before.ids, before.pixels)
+        if fitted is not None and len(fitted[0]) >= max(0.9 * len(before), _MIN_CORNERS):
+            return BoardView(fitted[0], fitted[1], size, fitted[2])
+    return detect_board(gray, spec)

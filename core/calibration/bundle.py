@@ -131,9 +131,11 @@ class _Problem:
         s = self.start
 
         def camera(prefix: str, like: PinholeCamera) -> PinholeCamera:
-            values = [float(x[self.at[f"{prefix}.{n}"]]) if f"{prefix}.{n}" in self.at else 0.0 for n in INTRINSICS]
+            values = [
+                float(x[self.at[f"{prefix}.{n}"]]) if f"{prefix}.{n}" in self.at else 0.0 for n in INTRINSICS
+            ]
             lens = tuple(values[4:]) if any(values[4:]) else ()
-            return PinholeCamera(like.width, like.height, *values[:4], lens)
+            return PinholeCamera(like.width, like.height, values[0], values[1], values[2], values[3], lens)
 
         relation = s.color_from_depth
         if s.color is not None:
@@ -277,14 +279,17 @@ def adjust(
     )  # fmt: skip
     bundle = problem.unpack(solved.x)
     jacobian = at(solved.x)[1]
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)[: problem.shared, : problem.shared]
+    whole: FloatArray = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), float)
+    covariance = whole[: problem.shared, : problem.shared]
     infrared, color, depth = [], [], np.full(len(views), np.nan)
     for k, (view, pose) in enumerate(zip(views, bundle.poses, strict=True)):
         infrared.append(_off(bundle.depth, pose, view.infrared, spec))
         color.append(_off(bundle.color, bundle.color_from_depth @ pose, view.color, spec))
         plane = planes[k]
         if plane is not None:
-            depth[k] = bundle.offset_m + bundle.scale * plane.depth_m - plane_at(bundle.depth, pose, plane.pixel)
+            depth[k] = (
+                bundle.offset_m + bundle.scale * plane.depth_m - plane_at(bundle.depth, pose, plane.pixel)
+            )
     return Adjusted(bundle, tuple(problem.names), covariance, infrared, color, depth)
 
 
@@ -303,7 +308,14 @@ def _off(camera: PinholeCamera | None, pose: RigidTransform, seen: object, spec:
 
 
 def _intrinsics(camera: PinholeCamera) -> list[float]:
-    return [camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion, *(0.0,) * (5 - len(camera.distortion))]
+    return [
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        *camera.distortion,
+        *(0.0,) * (5 - len(camera.distortion)),
+    ]
 
 
 def _turn(transform: RigidTransform) -> FloatArray:

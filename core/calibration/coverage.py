@@ -50,7 +50,9 @@ class CameraCoverage:
     def share(self) -> float:
         """How much of what is wanted is there, 0 to 1."""
         cells = float((np.minimum(self.regions, _CORNERS_A_CELL) / _CORNERS_A_CELL).mean())
-        distances = np.mean([min(n, _WANTED_DISTANCE) / _WANTED_DISTANCE for n in (self.near, self.middle, self.far)])
+        distances = np.mean(
+            [min(n, _WANTED_DISTANCE) / _WANTED_DISTANCE for n in (self.near, self.middle, self.far)]
+        )
         tilts = np.mean([min(self.tilts[t], n) / n for t, n in _WANTED_TILT.items()])
         return float(0.5 * cells + 0.2 * distances + 0.3 * tilts)
 

@@ -80,10 +80,10 @@ def plane_depth(
     rays, inverse = rays[near], 1.0 / measured[near]
     middle = np.array([u[near].mean(), v[near].mean()])
     keep = np.ones(len(rays), bool)
-    plane = np.zeros(3)
+    plane: FloatArray = np.zeros(3)
     spread = 0.0
     for _ in range(4):
-        plane, *_ = np.linalg.lstsq(rays[keep], inverse[keep], rcond=None)
+        plane = np.asarray(np.linalg.lstsq(rays[keep], inverse[keep], rcond=None)[0], float)
         off = inverse - rays @ plane
         spread = 1.4826 * float(np.median(np.abs(off[keep]))) + 1e-6
         # Steps of the reading can be wider than the noise: never cut inside three of them.
@@ -93,5 +93,8 @@ def plane_depth(
         return None
     z = 1.0 / at
     return PlaneDepth(
-        (float(middle[0]), float(middle[1])), z, float((inverse - rays @ plane)[keep].std() * z * z), int(keep.sum())
+        (float(middle[0]), float(middle[1])),
+        z,
+        float((inverse - rays @ plane)[keep].std() * z * z),
+        int(keep.sum()),
     )

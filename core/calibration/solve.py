@@ -141,20 +141,25 @@ def solve_rig(
     color_lens, color_at = _lens(views, "color", spec, kept, reasons) if has_color else (None, {})
     relation = RigidTransform() if color_lens is None else _relation(depth_at, color_at, kept, reasons)
     poses: dict[int, RigidTransform] = {}
-    for k in np.flatnonzero(kept):
+    for k in map(int, np.flatnonzero(kept)):
         if k in depth_at:
-            poses[int(k)] = depth_at[k]
+            poses[k] = depth_at[k]
         elif k in color_at:
-            poses[int(k)] = relation.inverse() @ color_at[k]
+            poses[k] = relation.inverse() @ color_at[k]
         else:
             kept[k], reasons[k] = False, reasons[k] or "the board was not found"
     lenses = (depth_lens.model, () if color_lens is None else color_lens.model)
-    start = Bundle(depth_lens.camera, None if color_lens is None else color_lens.camera, relation, 1.0, 0.0, [])
+    start = Bundle(
+        depth_lens.camera, None if color_lens is None else color_lens.camera, relation, 1.0, 0.0, []
+    )
     progress(0.5, "Measuring the board's depth")
     planes = _planes(views, spec, depth_lens, poses)
-    adjusted, noise = None, Noise(
-        max(depth_lens.rms_px / np.sqrt(2), _LEAST_CORNER_SIGMA_PX),
-        max((color_lens.rms_px if color_lens else 0.0) / np.sqrt(2), _LEAST_CORNER_SIGMA_PX),
+    adjusted, noise = (
+        None,
+        Noise(
+            max(depth_lens.rms_px / np.sqrt(2), _LEAST_CORNER_SIGMA_PX),
+            max((color_lens.rms_px if color_lens else 0.0) / np.sqrt(2), _LEAST_CORNER_SIGMA_PX),
+        ),
     )
     rounds = 4
     for turn in range(rounds):
@@ -187,7 +192,11 @@ def _lens(
             raise WorkError(
                 f"Only {len(numbers)} {what} views show the board.",
                 f"At least {MIN_VIEWS} are needed, better 25"
-                + (": stream infrared, with the emitter covered if its pattern disturbs." if kind == "infrared" else "."),
+                + (
+                    ": stream infrared, with the emitter covered if its pattern disturbs."
+                    if kind == "infrared"
+                    else "."
+                ),
             )
         fit = fit_lens([getattr(views[k], kind) for k in numbers], spec)
         limit = max(_OUTLIER * float(np.median(fit.view_rms_px)), _OUTLIER_FLOOR_PX)
@@ -217,7 +226,9 @@ def _relation(
     far = np.linalg.norm(shift - middle, axis=1)
     best = each[int(np.argmin(far))].rotation
     turn = np.array([np.arccos(np.clip((np.trace(t.rotation @ best.T) - 1) / 2, -1, 1)) for t in each])
-    bad = (far > max(6 * float(np.median(far)), 0.02)) | (turn > max(6 * float(np.median(turn)), np.deg2rad(2)))
+    bad = (far > max(6 * float(np.median(far)), 0.02)) | (
+        turn > max(6 * float(np.median(turn)), np.deg2rad(2))
+    )
     for k, wrong in zip(common, bad, strict=True):
         if wrong:
             kept[k], reasons[k] = False, "the two cameras did not see the board in the same place"
@@ -258,7 +269,9 @@ def _noise(adjusted: Adjusted, planes: Sequence[PlaneDepth | None]) -> Noise:
         return max(float(np.sqrt(total / max(count - 3 * seen - 9, count / 4))), _LEAST_CORNER_SIGMA_PX)
 
     relative = [
-        off / plane.depth_m**2 for off, plane in zip(adjusted.depth_m, planes, strict=True) if plane is not None
+        off / plane.depth_m**2
+        for off, plane in zip(adjusted.depth_m, planes, strict=True)
+        if plane is not None
     ]
     depth = Noise().depth
     if len(relative) > 4:
@@ -334,7 +347,9 @@ def _solution(
     if len(distances) < 4:
         notes.append("Depth was not compared with the board: scale and offset of the depth are as delivered.")
     elif "correction.offset" not in at or np.ptp(distances) < _SAME_DEPTH_SPAN * np.median(distances):
-        notes.append("All views are at about the same distance: scale and offset of the depth are not told apart.")
+        notes.append(
+            "All views are at about the same distance: scale and offset of the depth are not told apart."
+        )
     left_out = sum(bool(r) for r in reasons)
     if left_out:
         notes.append(f"{left_out} of {len(views)} views were left out because they do not fit the others.")

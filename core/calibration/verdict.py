@@ -93,11 +93,17 @@ def judge(solution: RigSolution, coverage: Sequence[CameraCoverage] = ()) -> Ver
             continue
         rms = solution.rms_px["depth" if name == "infrared" else "color"]
         scale = max(camera.width, 640)
-        check(rms, (_RMS_SHARE[0] * scale, _RMS_SHARE[1] * scale), f"The {name} corners are {rms:.2f} pixels off.")
+        check(
+            rms,
+            (_RMS_SHARE[0] * scale, _RMS_SHARE[1] * scale),
+            f"The {name} corners are {rms:.2f} pixels off.",
+        )
     for what, covered in zip(("infrared", "colour"), coverage, strict=False):
         if covered.share < _LEAST_SHARE[0]:
             level = 2 if covered.share < _LEAST_SHARE[1] else 1
-            reasons.append((level, f"The views cover {100 * covered.share:.0f} % of what the {what} camera needs."))
+            reasons.append(
+                (level, f"The views cover {100 * covered.share:.0f} % of what the {what} camera needs.")
+            )
     if not np.isfinite(depth):
         reasons.append((1, "Depth was not compared with the board."))
     if not np.isfinite(length):
@@ -139,7 +145,9 @@ def skin_error(solution: RigSolution) -> dict[str, float]:
 
     def seen(shift: dict[str, float]) -> tuple[FloatArray, FloatArray, float]:
         shifted = _shifted(rig, shift)
-        far = offset + shift.get("correction.offset", 0.0) + (scale + shift.get("correction.scale", 0.0)) * raw
+        far = (
+            offset + shift.get("correction.offset", 0.0) + (scale + shift.get("correction.scale", 0.0)) * raw
+        )
         points = shifted.depth.rays(pixels) * far
         focal = rig.picture_camera.fx
         return points, shifted.project_to_picture(points) * (1000 * z / focal), 1000 * far
@@ -171,7 +179,11 @@ def skin_error(solution: RigSolution) -> dict[str, float]:
     ends = lengths - lengths.mean(axis=1, keepdims=True)
     reach = np.linalg.norm(body[:, :2] - body[:, :2].mean(axis=0), axis=1)
     far = reach > 0.5 * reach.max()
-    length = float((2.0 * np.linalg.norm(bound(ends), axis=1)[far] / reach[far]).max() * 100) if far.any() else float("nan")
+    length = (
+        float((2.0 * np.linalg.norm(bound(ends), axis=1)[far] / reach[far]).max() * 100)
+        if far.any()
+        else float("nan")
+    )
     return {"picture_mm": picture_mm, "depth_mm": depth_mm, "length_percent": length}
 
 
@@ -181,7 +193,10 @@ def _shifted(rig: CameraRig, shift: dict[str, float]) -> CameraRig:
     def camera(prefix: str, c: PinholeCamera) -> PinholeCamera:
         values = {n: getattr(c, n) + shift.get(f"{prefix}.{n}", 0.0) for n in ("fx", "fy", "cx", "cy")}
         lens = list(c.distortion) + [0.0] * (5 - len(c.distortion))
-        lens = [v + shift.get(f"{prefix}.{n}", 0.0) for v, n in zip(lens, ("k1", "k2", "p1", "p2", "k3"), strict=True)]
+        lens = [
+            v + shift.get(f"{prefix}.{n}", 0.0)
+            for v, n in zip(lens, ("k1", "k2", "p1", "p2", "k3"), strict=True)
+        ]
         return replace(c, **values, distortion=tuple(lens) if any(lens) else ())
 
     color, relation = None, None

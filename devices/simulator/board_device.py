@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 from urllib.parse import parse_qsl
 
 import cv2
@@ -19,7 +19,6 @@ from core.calibration.board import BoardSpec
 from core.calibration.profile import CalibrationProfile
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig, RgbdCapture
-from core.capture.sensors import sensor_model
 from core.capture.transform import RigidTransform
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
@@ -40,6 +39,7 @@ FloatArray = NDArray[np.float64]
 
 FRAMES_PER_S = 12
 _DWELL_S, _MOVE_S = 0.9, 0.8
+_QUICK_S = (0.45, 0.15)
 _POSES = 48
 _EXPOSURE_S = 1 / 60
 _TREMOR_M, _TREMOR_RAD = 0.00025, 0.0006
@@ -92,16 +92,20 @@ class BoardMotion:
         self._frequency = rng.uniform(0.3, 1.2, (2, 3, 3))
         self._phase = rng.uniform(0, 2 * np.pi, (2, 3, 3))
 
-    def at(self, time_s: float, dwell_s: float = _DWELL_S) -> RigidTransform:
+    def at(self, time_s: float, dwell_s: float = _DWELL_S, move_s: float = _MOVE_S) -> RigidTransform:
         """Pose at a time; it goes round when all poses have been shown."""
-        period = dwell_s + _MOVE_S
+        period = dwell_s + move_s
         k = int(time_s // period)
-        share = max(time_s - k * period - dwell_s, 0.0) / _MOVE_S
+        share = max(time_s - k * period - dwell_s, 0.0) / move_s
         share = share * share * (3 - 2 * share)
         a, b = self._poses[k % len(self._poses)], self._poses[(k + 1) % len(self._poses)]
         wave = np.sin(2 * np.pi * self._frequency * time_s + self._phase).sum(axis=2)
         turn = np.asarray(cv2.Rodrigues(b.rotation @ a.rotation.T)[0], float).ravel() * share
-        rotation = np.asarray(cv2.Rodrigues(_TREMOR_RAD * wave[0])[0]) @ np.asarray(cv2.Rodrigues(turn)[0]) @ a.rotation
+        rotation = (
+            np.asarray(cv2.Rodrigues(_TREMOR_RAD * wave[0])[0])
+            @ np.asarray(cv2.Rodrigues(turn)[0])
+            @ a.rotation
+        )
         start, end = a.apply(self._centre), b.apply(self._centre)
         centre = start + share * (end - start) + _TREMOR_M * wave[1]
         return RigidTransform(np.asarray(rotation, float), centre - rotation @ self._centre)
@@ -131,7 +135,9 @@ class SimulatedBoardCamera:
     @property
     def info(self) -> DeviceInfo:
         """Which camera this is."""
-        return DeviceInfo(f"simulator-board:{_address(self._scene)}", "Simulated calibration board", "simulator", True)
+        return DeviceInfo(
+            f"simulator-board:{_address(self._scene)}", "Simulated calibration board", "simulator", True
+        )
 
     @property
     def spec(self) -> BoardSpec:
@@ -147,14 +153,14 @@ class SimulatedBoardCamera:
     def identity(self) -> CameraIdentity:
         """Serial numbers made of the seed."""
         serial = f"SIM-BOARD-{self._scene.seed}-{self._scene.color_size[0]}"
-        return CameraIdentity("Simulated calibration board", serial, serial, self._truth.sensor)
+        return CameraIdentity("Simulated calibration board", serial, serial, self._truth.sensor.name)
 
     @property
     def rig(self) -> CameraRig:
         """Geometry in force: the profile's, or nominal."""
         if self._profile is not None:
             return self._profile.rig
-        sensor = sensor_model(self._truth.sensor)
+        sensor = self._truth.sensor
         width, height = self._scene.color_size
         c = sensor.color_camera
         share = width / c.width
@@ -198,7 +204,8 @@ class SimulatedBoardCamera:
         wanted = frozenset(streams)
         if self._scene.exclusive and {"color", "infrared"} <= wanted:
             raise WorkError(
-                "This camera cannot stream infrared and colour at the same time.", "Start one after the other."
+                "This camera cannot stream infrared and colour at the same time.",
+                "Start one after the other.",
             )
         if self._renderer is None:
             raise WorkError("The simulated camera is closed.", "Open it first.")
@@ -233,10 +240,11 @@ class SimulatedBoardCamera:
         assert self._renderer is not None
         assert self._motion is not None
         t = (number - 1) / FRAMES_PER_S
-        # Where streams change in between, a view takes about three times as long.
-        dwell = 3 * _DWELL_S if self._scene.exclusive else _DWELL_S
-        pose = self._motion.at(t, dwell)
-        motion = self._motion.at(t + _EXPOSURE_S, dwell) @ pose.inverse()
+        # Where streams change in between, a view takes longer; without a real clock nobody needs time to look.
+        dwell, move = _QUICK_S if self._scene.free else (_DWELL_S, _MOVE_S)
+        dwell *= 2.5 if self._scene.exclusive else 1.0
+        pose = self._motion.at(t, dwell, move)
+        motion = self._motion.at(t + _EXPOSURE_S, dwell, move) @ pose.inverse()
         seen = self._renderer.render(pose, self._streams, motion)
         moment = self._begun_s + t
         return LiveFrame(number, moment, seen.depth, 0.001, seen.rgb, moment, seen.infrared)
@@ -268,9 +276,11 @@ class SimulatedBoardCamera:
         if "depth" not in self._streams:
             raise WorkError("The camera streams no depth.", "Start the depth stream, then capture.")
         burst = collect_burst(self.latest, frames, progress)
-        warnings = () if self._profile is not None else ("The geometry is nominal: the camera is not calibrated.",)
+        warnings = (
+            () if self._profile is not None else ("The geometry is nominal: the camera is not calibrated.",)
+        )
         return assemble_capture(
-            burst, self.rig, sensor=self._truth.sensor, profile=self._profile, warnings=warnings,
+            burst, self.rig, sensor=self._truth.sensor.name, profile=self._profile, warnings=warnings,
             taken_at=datetime.now(UTC),
         )  # fmt: skip
 
@@ -325,6 +335,10 @@ def _knocked(board_rig: BoardRig, scene: BoardScene) -> BoardRig:
     return replace(board_rig, rig=CameraRig(rig.depth, rig.color, knock @ rig.picture_from_depth))
 
 
+def _with(scene: BoardScene, option: str, value: Any) -> BoardScene:
+    return replace(scene, **{option: value})
+
+
 def _address(scene: BoardScene) -> str:
     usual = BoardScene()
     parts = [
@@ -365,14 +379,14 @@ class _BoardCameras:
                     BoardSpec.for_paper(text)
                     scene = replace(scene, paper=text.upper())
                 elif option in ("exclusive", "free"):
-                    scene = replace(scene, **{option: bool(int(text))})
+                    scene = _with(scene, option, bool(int(text)))
                 elif option == "seed":
                     scene = replace(scene, seed=abs(int(text)))
                 elif option in ("moved_deg", "moved_mm"):
                     value = float(text)
                     if not abs(value) <= 50:
                         raise InputError(f"'{option}' of a simulated board is at most 50.")
-                    scene = replace(scene, **{option: value})
+                    scene = _with(scene, option, value)
                 else:
                     raise InputError(
                         f"A simulated board has no option '{option}'.",

@@ -24,6 +24,7 @@ Image = NDArray[np.float32]
 _MODULE_PX = 24
 _MARGIN_SQUARES = 0.5
 _WALL_M = 3.2
+_SMEAR_PX = 0.3
 _WHITE, _BLACK = 0.80, 0.05
 
 
@@ -141,6 +142,8 @@ class BoardRenderer:
         self._pyramid = _texture_pyramid(spec)
         self._color = _Eye(board_rig.rig.color, board_rig.color_quality)
         self._infrared = _Eye(board_rig.rig.depth, board_rig.infrared_quality)
+        self._depth_rays = board_rig.rig.depth.pixel_rays.astype(np.float32)
+        self._depth_length = np.linalg.norm(self._depth_rays, axis=2)
         self._sensor = replace(board_rig.sensor, depth_camera=board_rig.rig.depth)
 
     def render(
@@ -164,55 +167,59 @@ class BoardRenderer:
         rgb = infrared = depth = None
         if "color" in streams:
             color_from_depth = rig.picture_from_depth
-            tone = self._tone(
-                self._color, color_from_depth @ depth_from_board, color_from_depth @ moving
-            )
+            tone = self._tone(self._color, color_from_depth @ depth_from_board, color_from_depth @ moving)
             tint = np.array([1.0, 0.985, 0.96], np.float32)
-            noise = self._rng.standard_normal((*tone.shape, 3), dtype=np.float32)
-            values = tone[..., None] * tint + np.float32(self.board_rig.color_quality.noise) * noise
-            rgb = cv2.convertScaleAbs(np.maximum(values, 0.0), alpha=255.0)
+            noise = self._color.grain(self._rng, 3) * np.float32(255 * self.board_rig.color_quality.noise)
+            noise += tone[..., None] * (255 * tint)
+            rgb = np.clip(noise, 0, 255, out=noise).astype(np.uint8)
         if "infrared" in streams:
             tone = self._tone(self._infrared, depth_from_board, moving)
-            noise = self._rng.standard_normal(tone.shape, dtype=np.float32)
-            values = tone + np.float32(self.board_rig.infrared_quality.noise) * noise
-            infrared = cv2.convertScaleAbs(np.maximum(values, 0.0), alpha=255.0)
+            noise = self._infrared.grain(self._rng, 1)[..., 0] * np.float32(
+                255 * self.board_rig.infrared_quality.noise
+            )
+            noise += 255 * tone
+            infrared = np.clip(noise, 0, 255, out=noise).astype(np.uint8)
         if "depth" in streams:
             depth = self._depth(depth_from_board)
         return BoardPictures(rgb, infrared, depth)
 
     def _tone(self, eye: _Eye, start: RigidTransform, end: RigidTransform) -> Image:
-        tone = eye.see(self._pyramid, self.spec, start)
+        tone: Image = eye.see(self._pyramid, self.spec, start)
         if end is not start:
             centre = self.spec.centre_m[None]
             shift = eye.camera.project(end.apply(centre)) - eye.camera.project(start.apply(centre))
-            steps = int(min(np.ceil(np.hypot(*shift[0])) + 1, 8))
-            if steps > 1:
+            smear = float(np.hypot(*shift[0]))
+            steps = int(min(np.ceil(smear) + 1, 8))
+            if smear > _SMEAR_PX:
                 # Between two poses a board moves nearly as a line: a few moments of it make the smear.
                 for k in range(1, steps):
                     share = k / (steps - 1)
                     tone = tone + eye.see(self._pyramid, self.spec, _between(start, end, share))
-                tone = tone / steps
+                tone = np.asarray(tone / np.float32(steps))
         return eye.develop(tone)
 
     def _depth(self, depth_from_board: RigidTransform) -> NDArray[np.uint16]:
-        camera = self.board_rig.rig.depth
-        rays = camera.pixel_rays
+        rays = self._depth_rays
         x, y, z = _on_board(rays, depth_from_board)
         paper = _on_paper(x, y, z, self.spec)
         true = np.where(paper, z, _WALL_M).astype(np.float32)
         normal = depth_from_board.rotation[:, 2]
-        length = np.linalg.norm(rays, axis=2)
-        cosine = np.where(paper, np.abs(rays @ normal), rays[..., 2]) / length
-        shadow = self._shadow(rays, depth_from_board) & ~paper
+        facing = np.abs(rays @ normal.astype(np.float32))
+        cosine = np.where(paper, facing, np.float32(1)) / self._depth_length
+        shadow = cv2.resize(
+            self._shadow(rays[::2, ::2], depth_from_board).view(np.uint8),
+            paper.shape[::-1],
+            interpolation=cv2.INTER_NEAREST,
+        )
         error = self.board_rig.depth_error
         told = ((true - error.offset_m) / error.scale).astype(np.float32)
-        view = SensorView(told, cosine.astype(np.float32), shadow)
+        view = SensorView(told, cosine.astype(np.float32), (shadow > 0) & ~paper)
         return FrameMaker(self._sensor, view, self.board_rig.device_seed, self._rng).frame(told)
 
-    def _shadow(self, rays: FloatArray, depth_from_board: RigidTransform) -> NDArray[np.bool_]:
+    def _shadow(self, rays: Image, depth_from_board: RigidTransform) -> NDArray[np.bool_]:
         """Wall that the projector does not reach because the board stands between."""
         projector = np.array([self._sensor.baseline_m, 0.0, 0.0])
-        toward = rays * _WALL_M - projector
+        toward = (rays * np.float32(_WALL_M)) - projector.astype(np.float32)
         board_from_depth = depth_from_board.inverse()
         eye, d = board_from_depth.apply(projector), board_from_depth.rotate(toward)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -226,7 +233,7 @@ class _Eye:
 
     def __init__(self, camera: PinholeCamera, quality: PictureQuality) -> None:
         self.camera, self.quality = camera, quality
-        self.fine = 3 if camera.width < 1000 else (2 if camera.width < 2000 else 1)
+        self.fine = 2 if camera.width < 2000 else 1
         f = self.fine
         sampled = PinholeCamera(
             camera.width * f, camera.height * f, camera.fx * f, camera.fy * f,
@@ -237,28 +244,38 @@ class _Eye:
         v = (np.arange(camera.height) - camera.cy) / (camera.width / 2)
         r2 = (u[None, :] ** 2 + v[:, None] ** 2) / (1 + (camera.height / camera.width) ** 2)
         self.light = (1 - quality.vignetting * r2).astype(np.float32)
+        self._sheet: Image | None = None
         rng = np.random.default_rng((0x3A11, camera.width))
         small = rng.random((9, 12), dtype=np.float32)
-        self.wall = (0.22 + 0.25 * cv2.resize(small, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)).astype(np.float32)
+        self.wall = (
+            0.22 + 0.25 * cv2.resize(small, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
+        ).astype(np.float32)
 
     def see(self, pyramid: Sequence[Image], spec: BoardSpec, camera_from_board: RigidTransform) -> Image:
         """Linear tone (h, w) of board and wall, before the lens."""
         f, tone = self.fine, self.wall.copy()
         margin = _MARGIN_SQUARES * spec.square_m
         w, h = spec.size_m
-        paper = np.array([[-margin, -margin, 0], [w + margin, -margin, 0], [w + margin, h + margin, 0], [-margin, h + margin, 0]])
+        paper = np.array(
+            [
+                [-margin, -margin, 0],
+                [w + margin, -margin, 0],
+                [w + margin, h + margin, 0],
+                [-margin, h + margin, 0],
+            ]
+        )
         edge = np.linspace(0, 1, 9)[:, None]
         rim = np.concatenate([paper[k] + edge * (paper[(k + 1) % 4] - paper[k]) for k in range(4)])
         corners = camera_from_board.apply(rim)
         if (corners[:, 2] < 0.05).any():
-            return tone
+            return np.asarray(tone)
         pixels = self.camera.project(corners)
         low = np.floor(pixels.min(axis=0) - 2).astype(int)
         high = np.ceil(pixels.max(axis=0) + 3).astype(int)
         u0, v0 = max(low[0], 0), max(low[1], 0)
         u1, v1 = min(high[0], self.camera.width), min(high[1], self.camera.height)
         if u1 <= u0 or v1 <= v0:
-            return tone
+            return np.asarray(tone)
         x, y, z = _on_board(self.rays[v0 * f : v1 * f, u0 * f : u1 * f], camera_from_board)
         side = np.abs(np.median(z)) / (self.camera.fx * f)
         texel = spec.square_m / (8 * _MODULE_PX)
@@ -266,7 +283,9 @@ class _Eye:
         scale = 1.0 / (texel * 2**level)
         tu = ((x + margin) * scale - 0.5).astype(np.float32)
         tv = ((y + margin) * scale - 0.5).astype(np.float32)
-        board = cv2.remap(pyramid[level], tu, tv, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=-1.0)
+        board = cv2.remap(
+            pyramid[level], tu, tv, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=-1.0
+        )
         cover = ((board >= 0) & (z > 0)).astype(np.float32)
         board = np.maximum(board, 0.0) * cover
         if f > 1:
@@ -276,7 +295,16 @@ class _Eye:
         part = tone[v0:v1, u0:u1]
         part *= 1 - cover
         part += board
-        return tone
+        return np.asarray(tone)
+
+    def grain(self, rng: np.random.Generator, channels: int) -> Image:
+        """Unit noise (h, w, channels): a random piece of a larger sheet, which is cheaper than fresh noise."""
+        h, w = self.camera.height, self.camera.width
+        if self._sheet is None:
+            self._sheet = rng.standard_normal(((h + 128) * (w + 128) * channels,), dtype=np.float32)
+        count = h * w * channels
+        start = int(rng.integers(0, len(self._sheet) - count))
+        return self._sheet[start : start + count].reshape(h, w, channels).copy()
 
     def develop(self, tone: Image) -> Image:
         """Lens and sensor response: tone (h, w) in 0..1 without noise."""
