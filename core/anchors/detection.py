@@ -94,10 +94,11 @@ def _look_twice(
     two says how sure a landmark is.
     """
     square = _square(pixels, CROP_SCALES[0])
-    first = _detect(picture, square, tracker)
+    crop = _crop(picture, square)
+    first = _look(crop, square, tracker, mirror=False)
     if first is None:
         return None
-    second = _detect(picture, square, tracker, mirror=True)
+    second = _look(crop, square, tracker, mirror=True)
     return first if second is None else consensus([first, second], _faces(first))
 
 
@@ -263,6 +264,11 @@ def _detect(
     mirror: bool = False,
 ) -> PoseLandmarks | None:
     """Run the tracker on a square of an image; the answer is in the image's pixels."""
+    return _look(_crop(image, square), square, tracker, mirror=mirror)
+
+
+def _crop(image: NDArray[np.uint8], square: tuple[float, float, float]) -> NDArray[np.uint8]:
+    """The square of an image, `CROP_SIZE` pixels wide."""
     x, y, side = square
     scale = CROP_SIZE / side
     middle = (CROP_SIZE - 1) / 2
@@ -270,18 +276,28 @@ def _detect(
         # area averaging first, or fine texture turns into noise
         blur = 0.45 / scale
         image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur), dtype=np.uint8) if blur > 0.6 else image
-    sign = -1.0 if mirror else 1.0
-    matrix = np.array([[sign * scale, 0.0, middle - sign * scale * x], [0.0, scale, middle - scale * y]])
+    matrix = np.array([[scale, 0.0, middle - scale * x], [0.0, scale, middle - scale * y]])
     crop = cv2.warpAffine(
         image, matrix, (CROP_SIZE, CROP_SIZE), flags=cv2.INTER_LINEAR, borderValue=(118.0, 118.0, 118.0)
     )
-    found = tracker.detect(np.asarray(crop, dtype=np.uint8))
+    return np.asarray(crop, dtype=np.uint8)
+
+
+def _look(
+    crop: NDArray[np.uint8],
+    square: tuple[float, float, float],
+    tracker: SkeletonTracker,
+    *,
+    mirror: bool,
+) -> PoseLandmarks | None:
+    """Run the tracker on a crop or its mirror image; the answer is in the pixels of the whole image."""
+    found = tracker.detect(np.ascontiguousarray(crop[:, ::-1]) if mirror else crop)
     if found is None:
         return None
-    pixels = np.stack(
-        [(found.pixels[:, 0] - matrix[0, 2]) / matrix[0, 0], (found.pixels[:, 1] - matrix[1, 2]) / scale],
-        axis=1,
-    )
-    if not mirror:
-        return PoseLandmarks(pixels, found.visibility)
-    return PoseLandmarks(pixels[_OPPOSITE], found.visibility[_OPPOSITE])
+    x, y, side = square
+    at = found.pixels.copy()
+    visibility = found.visibility
+    if mirror:
+        at[:, 0] = CROP_SIZE - 1 - at[:, 0]
+        at, visibility = at[_OPPOSITE], visibility[_OPPOSITE]
+    return PoseLandmarks((at - (CROP_SIZE - 1) / 2) * (side / CROP_SIZE) + np.array([x, y]), visibility)
