@@ -195,18 +195,10 @@ def _report(
 
 def _motion(taken: RgbdCapture) -> float | None:
     """Movement of the body within the burst; None if it cannot be told (a single frame)."""
-    from devices.auxiliary.pairing import DepthTrail
+    from devices.auxiliary.body_motion import motion_within
 
-    count = len(taken.depth_frames)
-    if count < 3:
-        return None
-    trail = DepthTrail(taken.rig.depth)
-    for i, frame in enumerate(taken.depth_frames):
-        trail.add(1.0 + i / 30.0, frame, taken.depth_unit_m)
-    third = max(1, count // 3) / 30.0
-    end = 1.0 + (count - 1) / 30.0
-    moved = trail.moved_m(1.0 + third / 2, end - third / 2)
-    return None if moved is None else round(moved, 5)
+    motion = motion_within(taken.depth_frames, taken.depth_unit_m, taken.rig.depth)
+    return None if motion is None else round(motion.moved_m, 5)
 
 
 def _text(report: dict[str, Any]) -> str:

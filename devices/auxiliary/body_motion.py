@@ -122,6 +122,19 @@ def body_motion(
     return BodyMotion(float(np.hypot(whole, parts)), whole, parts)
 
 
+def motion_within(frames: NDArray[np.uint16], unit_m: float, camera: PinholeCamera) -> BodyMotion | None:
+    """Movement from the first to the last third of a burst (n, h, w); None if it cannot be told."""
+    third = len(frames) // 3
+    if third < 1:
+        return None
+    before, after = (
+        np.stack([reduced_depth(frame, unit_m) for frame in part])
+        for part in (frames[:third], frames[-third:])
+    )
+    # A block must have been measured every time: a mean over changing pixels is no mean of one place.
+    return body_motion(before.mean(axis=0), after.mean(axis=0), reduced_camera(camera))
+
+
 def _body(depth: NDArray[np.float32]) -> tuple[BoolArray, BoolArray]:
     """The largest connected surface in front, about the middle of the image; and limbs set off by an edge.
 

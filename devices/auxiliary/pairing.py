@@ -23,6 +23,7 @@ _REMEMBERED_S = 20.0
 _AROUND_S = 0.12
 _SHORT_GAP_S = 0.15
 _UNCHECKED_S = 0.3
+_SHORTEST_BURST_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,9 @@ class DepthTrail:
         mean = np.nansum(stack, axis=0) / np.maximum(count, 1)
         return np.where(2 * count >= len(chosen), mean, np.nan).astype(np.float32)
 
-    def moved_m(self, from_s: float, to_s: float) -> float | None:
+    def moved_m(self, from_s: float, to_s: float, within_s: float = _AROUND_S) -> float | None:
         """How far the body moved from one moment to another; None if it cannot be told."""
-        before, after = self.at(from_s), self.at(to_s)
+        before, after = self.at(from_s, within_s), self.at(to_s, within_s)
         if before is None or after is None:
             return None
         motion = body_motion(before, after, self._camera)
@@ -122,7 +123,9 @@ class DepthTrail:
         middle = 0.5 * (first + last)
         gap = picture.time_s - middle
         third = (last - first) / 3.0
-        within = self.moved_m(first + third / 2, last - third / 2) if last > first else None
+        within = None
+        if last - first >= _SHORTEST_BURST_S:
+            within = self.moved_m(first + third / 2, last - third / 2, min(_AROUND_S, third / 2))
         if abs(gap) + 2 * picture.time_sigma_s <= _SHORT_GAP_S:
             reach = abs(gap) + picture.time_sigma_s
             speed = None if within is None else within / (2.0 * third)
