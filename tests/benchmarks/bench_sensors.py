@@ -2,7 +2,7 @@
 
 The first eight pairs of the frozen test split with a Kinect v1 (structured light), a Kinect v2 (time of
 flight) and a RealSense D435 (active stereo), all with the same auxiliary colour camera: geodesics alone
-(trilateration), the default by geometry only, and with appearance; beside them the sensor floor, and the error
+(trilateration), the default by geometry only and with appearance; beside them the sensor floor, and the error
 of shortest paths on the measured skin. About 25 minutes on two idle cores, a third of it for rendering.
 GEODERM_SIMULATED_CAPTURES names a folder that keeps captures: a run that was stopped then goes on. The whole
 tables are in sensors/sensors.md. None of these sensors was at hand: frames are drawn from resources/sensors.
