@@ -125,8 +125,9 @@ def record(
         If the camera goes, or the disk is full. What was recorded until then is kept as a complete recording
         and the message says so.
     """
-    if path.exists():
-        raise InputError(f"{path}: exists already.", "Choose another name.")
+    for file in (path, calibration_path(path)):
+        if file.exists():
+            raise InputError(f"{file}: exists already.", "Choose another name.")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder it would be in does not exist.")
     if path.suffix.lower() == ".oni" and isinstance(camera, OpenNICamera):
@@ -332,7 +333,7 @@ def _kept(partial: Path, path: Path) -> tuple[int, float]:
         if not _playable(partial):
             mend_oni(partial, partial)
         summary = inspect_oni(partial)
-        depth = summary.stream("depth")
+        depth = summary.stream("depth") or summary.stream("infrared")
     except InputError:
         depth = None
     if depth is None or not depth.frames:

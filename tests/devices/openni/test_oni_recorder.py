@@ -169,6 +169,9 @@ def test_an_existing_recording_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exists already"):
         record(open_source_of_one_frame(tmp_path), tmp_path / "a.oni", limits())
     assert (tmp_path / "a.oni").read_bytes() == b"mine"
+    calibration_path(tmp_path / "b.oni").write_text("{}")
+    with pytest.raises(InputError, match="exists already"):
+        record(open_source_of_one_frame(tmp_path), tmp_path / "b.oni", limits())
 
 
 def open_source_of_one_frame(folder: Path):  # type: ignore[no-untyped-def]

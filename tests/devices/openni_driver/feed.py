@@ -39,7 +39,7 @@ def build_redist(target: Path) -> Path | str:
     # Debian's runtime looks for lib*.so.0, the original for lib*.so; a driver is loaded by one name only.
     debian = any(drivers.glob("*.so.0"))
     ours = drivers / ("libFeed.so.0" if debian else "libFeed.so")
-    command = [compiler, "-std=c++17", "-O2", "-fPIC", "-shared", f"-I{headers}", f"-I{headers / 'Driver'}"]
+    command = [compiler, "-std=c++17", "-O1", "-fPIC", "-shared", f"-I{headers}", f"-I{headers / 'Driver'}"]
     built = subprocess.run(
         [*command, str(HERE / "feed_driver.cpp"), "-o", str(ours), "-lpthread"],
         capture_output=True,
