@@ -4,8 +4,8 @@ Two directions err for different reasons. Across the picture it is the landmark:
 is found at all, and how far several looks at this one differ. Along the line of sight it is the depth: noise
 and slope of the patch, another limb's layer in the same patch, and how deep under the skin this joint is.
 
-The shares of the kinds were learned on 22 rendered captures (11 people, fronts and backs, eight stances) and
-checked on 22 others; they include what the tracker and the simulator define differently.
+The shares of the kinds were learned on 22 rendered captures of seven people and checked on 22 captures of
+seven others (fronts and backs, ten stances); they include what tracker and simulator define differently.
 """
 
 from __future__ import annotations
@@ -28,17 +28,18 @@ class KindSigma:
 
 
 KIND_SIGMA: Final[dict[str, KindSigma]] = {
-    "head": KindSigma(0.022, 0.019),
-    "neck": KindSigma(0.023, 0.038),
-    "torso": KindSigma(0.066, 0.061),
-    "shoulder": KindSigma(0.018, 0.033),
-    "elbow": KindSigma(0.012, 0.015),
-    "hand": KindSigma(0.020, 0.032),
-    "hip": KindSigma(0.016, 0.028),
-    "knee": KindSigma(0.021, 0.015),
-    "foot": KindSigma(0.017, 0.019),
+    "head": KindSigma(0.022, 0.020),
+    "neck": KindSigma(0.022, 0.036),
+    "torso": KindSigma(0.064, 0.057),
+    "shoulder": KindSigma(0.017, 0.033),
+    "elbow": KindSigma(0.010, 0.017),
+    "hand": KindSigma(0.020, 0.034),
+    "hip": KindSigma(0.015, 0.025),
+    "knee": KindSigma(0.024, 0.016),
+    "foot": KindSigma(0.018, 0.021),
 }
-"""A `torso` that lies between shoulders and hips is another place than the simulator's."""
+"""A `torso` that lies between shoulders and hips is another place than the simulator's. Hands are meant
+without the few that are wholly wrong: those show in the spread of the looks."""
 
 SKIN_SIGMA: Final = KindSigma(0.018, 0.015)
 """Landmarks on the skin; the simulator has no truth for them: as the better joints."""
@@ -50,7 +51,7 @@ SPREAD_FACTOR: Final = 1.5
 """Two looks differ less than both differ from the truth."""
 
 CALIBRATED: Final = 0.9
-"""The parts overlap a little: with this factor 95 % ellipsoids hold some 95-97 % of the joints."""
+"""The parts overlap a little: with this factor 95 % ellipsoids hold 95-97 % of the joints."""
 
 HAND_SIGMA: Final = KindSigma(0.008, 0.015)
 """A joint placed by hand: the doctor's aim across the picture, the body's thickness in depth."""
