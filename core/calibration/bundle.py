@@ -23,6 +23,7 @@ from core.capture.transform import RigidTransform
 FloatArray = NDArray[np.float64]
 
 INTRINSICS = ("fx", "fy", "cx", "cy", *LENS_NAMES)
+_MAX_STEPS = 60
 _RELATION = ("rx", "ry", "rz", "tx", "ty", "tz")
 _DEPTH = ("scale", "offset")
 # How far from zero distortion coefficients of real lenses are: keeps the weakly seen ones from running off.
@@ -263,24 +264,12 @@ def adjust(
     lenses : pair of tuple of str
         Distortion coefficients to refine, of the depth and of the colour camera.
     """
-    from scipy.optimize import least_squares
-
     problem = _Problem(views, planes, spec, start, lenses, noise)
-    known: list[tuple[FloatArray, tuple[FloatArray, FloatArray]]] = []
-
-    def at(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if not known or not np.array_equal(known[-1][0], x):
-            known[:] = [(x.copy(), problem.evaluate(x))]
-        return known[-1][1]
-
-    solved = least_squares(
-        lambda x: at(x)[0], problem.pack(start), lambda x: at(x)[1], method="lm", x_scale="jac",
-        xtol=1e-10, ftol=1e-10, max_nfev=60,
-    )  # fmt: skip
-    bundle = problem.unpack(solved.x)
-    jacobian = at(solved.x)[1]
-    whole: FloatArray = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), float)
-    covariance = whole[: problem.shared, : problem.shared]
+    x, normal = _minimise(problem, problem.pack(start))
+    bundle = problem.unpack(x)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    whole = np.linalg.pinv(normal * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
+    covariance: FloatArray = np.asarray(whole, float)[: problem.shared, : problem.shared]
     infrared, color, depth = [], [], np.full(len(views), np.nan)
     for k, (view, pose) in enumerate(zip(views, bundle.poses, strict=True)):
         infrared.append(_off(bundle.depth, pose, view.infrared, spec))
@@ -291,6 +280,35 @@ def adjust(
                 bundle.offset_m + bundle.scale * plane.depth_m - plane_at(bundle.depth, pose, plane.pixel)
             )
     return Adjusted(bundle, tuple(problem.names), covariance, infrared, color, depth)
+
+
+def _minimise(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Levenberg and Marquardt's method on the normal equations: the solution and its normal matrix.
+
+    The equations are a tenth as large as the Jacobian, and scaled to ones on the diagonal they are well
+    conditioned enough for their inverse to be the covariance.
+    """
+    residual, jacobian = problem.evaluate(x)
+    cost, damping = float(residual @ residual), 1e-4
+    normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+    for _ in range(_MAX_STEPS):
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
+        scaled = normal * np.outer(scale, scale) + damping * np.eye(len(x))
+        step = -scale * np.linalg.solve(scaled, scale * gradient)
+        new_residual, new_jacobian = problem.evaluate(x + step)
+        new_cost = float(new_residual @ new_residual)
+        if not new_cost < cost:
+            damping *= 10.0
+            if damping > 1e8:
+                break
+            continue
+        gained, cost = cost - new_cost, new_cost
+        x, jacobian = x + step, new_jacobian
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ new_residual
+        damping = max(damping / 10.0, 1e-12)
+        if gained < 1e-7 * cost:
+            break
+    return x, normal
 
 
 def plane_at(camera: PinholeCamera, depth_from_board: RigidTransform, pixel: tuple[float, float]) -> float:

@@ -17,6 +17,7 @@ FloatArray = NDArray[np.float64]
 _EDGE_PX = 6
 _MIN_PIXELS = 300
 _MIN_FILLED = 0.6
+_ENOUGH_PIXELS = 6000
 _OTHER_THING_M = 0.12
 
 
@@ -68,7 +69,7 @@ def plane_depth(
     v, u = np.nonzero(mask)
     if len(u) < _MIN_PIXELS:
         return None
-    step = max(1, len(u) // 20000)
+    step = max(1, len(u) // _ENOUGH_PIXELS)
     u, v = u[::step], v[::step]
     rays = camera.rays(np.stack([u, v], axis=1).astype(float))
     normal = depth_from_board.rotation[:, 2]
@@ -83,7 +84,7 @@ def plane_depth(
     plane: FloatArray = np.zeros(3)
     spread = 0.0
     for _ in range(4):
-        plane = np.asarray(np.linalg.lstsq(rays[keep], inverse[keep], rcond=None)[0], float)
+        plane = np.asarray(np.linalg.solve(rays[keep].T @ rays[keep], rays[keep].T @ inverse[keep]), float)
         off = inverse - rays @ plane
         spread = 1.4826 * float(np.median(np.abs(off[keep]))) + 1e-6
         # Steps of the reading can be wider than the noise: never cut inside three of them.

@@ -233,7 +233,7 @@ class _Eye:
 
     def __init__(self, camera: PinholeCamera, quality: PictureQuality) -> None:
         self.camera, self.quality = camera, quality
-        self.fine = 2 if camera.width < 2000 else 1
+        self.fine = 2 if camera.width < 1200 else 1
         f = self.fine
         sampled = PinholeCamera(
             camera.width * f, camera.height * f, camera.fx * f, camera.fy * f,
@@ -279,7 +279,7 @@ class _Eye:
         x, y, z = _on_board(self.rays[v0 * f : v1 * f, u0 * f : u1 * f], camera_from_board)
         side = np.abs(np.median(z)) / (self.camera.fx * f)
         texel = spec.square_m / (8 * _MODULE_PX)
-        level = int(np.clip(np.floor(np.log2(max(side / texel, 1.0))), 0, len(pyramid) - 1))
+        level = int(np.clip(np.ceil(np.log2(max(side / texel, 1.0))), 0, len(pyramid) - 1))
         scale = 1.0 / (texel * 2**level)
         tu = ((x + margin) * scale - 0.5).astype(np.float32)
         tv = ((y + margin) * scale - 0.5).astype(np.float32)
