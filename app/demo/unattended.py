@@ -203,7 +203,7 @@ class Tour:
         page = self._page
         self.hands.wait_until(lambda: page.captures.deck.camera is not None, "the camera to open", 60)
         self._choose_stance("stance_stance", stance)
-        self.hands.wait_until(lambda: page.captures.stance.photo.image_size[0] > 0, "the live picture", 60)
+        self.hands.wait_until(lambda: page.captures.stance.live_view.image_size[0] > 0, "the live picture", 60)
         self.hands.settle(0.5)
         self.hands.shoot("stance_live")
         self.hands.click("stance_primary")

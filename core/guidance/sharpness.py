@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 SHARP_PX: Final = 1.4
-BLURRED_PX: Final = 2.2
+BLURRED_PX: Final = 1.9
 """Standard deviations of the blur, in pixels of a picture 640 wide."""
 
 _AGAIN_PX: Final = 1.2

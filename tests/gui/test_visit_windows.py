@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.context import AppContext
+from app.demo.scene import DemoCameras
 from app.theme import apply_theme
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.page import VisitPage
@@ -351,7 +352,9 @@ def test_the_demonstration_looks_through_the_simulated_camera_at_once(
     apply_theme(qapp)
     shutil.copytree(world.root / "clinic", tmp_path / "clinic")
     store = ClinicStore.open(tmp_path / "clinic")
-    context = AppContext(store, store.folder, tracker_factory=default_tracker, demonstration=True)
+    context = AppContext(
+        store, store.folder, cameras=DemoCameras(), tracker_factory=default_tracker, demonstration=True
+    )
     user = store.users.authenticate(USER, PASSWORD)
     assert user is not None
     context.log_in(user)
@@ -359,7 +362,7 @@ def test_the_demonstration_looks_through_the_simulated_camera_at_once(
     page.resize(1440, 900)
     page.show()
     screen = page.captures.stance
-    qtbot.waitUntil(lambda: screen.photo.image_size != (0, 0), timeout=60_000)
+    qtbot.waitUntil(lambda: screen.live_view.image_size != (0, 0), timeout=60_000)
     assert screen.stance_box.isVisible()
     assert screen.stance_box.currentData() == "psi"
     assert screen.panel.primary.isEnabled()
