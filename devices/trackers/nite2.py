@@ -1,7 +1,7 @@
 """NiTE2, the skeleton tracker of the thesis, where its proprietary runtime is installed.
 
-It never ran where this was written: there is no NiTE2 runtime for it to be tried with. Its loading, messages,
-process, structures and coordinates are tested; its tracking is not.
+NiTE2 itself never ran where this was written: there is no runtime to try it with. Loading, messages, process,
+structures and coordinates are tested with a library of the same C interface; the tracking is not.
 """
 
 from __future__ import annotations
