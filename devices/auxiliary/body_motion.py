@@ -13,7 +13,7 @@ from core.capture.camera import PinholeCamera
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-BLOCK = 4
+_REDUCED_WIDTH = 160
 _EDGE_M = 0.06
 _BAND_M = (-0.25, 0.65)
 _FEWEST_POINTS = 150
@@ -47,28 +47,35 @@ class BodyMotion:
 
 
 def reduced_depth(frame: NDArray[np.uint16], unit_m: float) -> NDArray[np.float32]:
-    """Depth in metres in blocks of 4 x 4 pixels; NaN where most is missing or an edge runs through."""
-    h, w = (side // BLOCK * BLOCK for side in frame.shape)
-    blocks = frame[:h, :w].reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK).swapaxes(1, 2)
-    cells = blocks.reshape(h // BLOCK, w // BLOCK, BLOCK * BLOCK).astype(np.float32)
+    """Depth in metres in blocks, about 160 across; NaN where most is missing or an edge runs through."""
+    k = _block(frame.shape[1])
+    h, w = (side // k * k for side in frame.shape)
+    blocks = frame[:h, :w].reshape(h // k, k, w // k, k).swapaxes(1, 2)
+    cells = blocks.reshape(h // k, w // k, k * k).astype(np.float32)
     count = (cells > 0).sum(axis=2)
     highest = cells.max(axis=2)
     lowest = np.where(cells > 0, cells, np.float32(65535)).min(axis=2)
     mean = cells.sum(axis=2) / np.maximum(count, 1)
-    good = (count > BLOCK * BLOCK // 2) & ((highest - lowest) * unit_m < 2 * _EDGE_M)
+    good = (2 * count > k * k) & ((highest - lowest) * unit_m < 2 * _EDGE_M)
     return np.where(good, mean * np.float32(unit_m), np.float32(np.nan)).astype(np.float32)
 
 
 def reduced_camera(camera: PinholeCamera) -> PinholeCamera:
     """Camera of `reduced_depth`; the lens's distortion is left out, it does not matter for a difference."""
+    k = _block(camera.width)
     return PinholeCamera(
-        camera.width // BLOCK,
-        camera.height // BLOCK,
-        camera.fx / BLOCK,
-        camera.fy / BLOCK,
-        (camera.cx + 0.5) / BLOCK - 0.5,
-        (camera.cy + 0.5) / BLOCK - 0.5,
+        camera.width // k,
+        camera.height // k,
+        camera.fx / k,
+        camera.fy / k,
+        (camera.cx + 0.5) / k - 0.5,
+        (camera.cy + 0.5) / k - 0.5,
     )
+
+
+def _block(width: int) -> int:
+    """Side of a block: the same share of the image whatever the resolution."""
+    return max(1, round(width / _REDUCED_WIDTH))
 
 
 def body_motion(

@@ -81,12 +81,12 @@ def find_latency(depth: Movement, color: Movement) -> Latency:
     WorkError
         If nothing moved, or the two saw different things.
     """
-    start = max(depth.times[:1] + color.times[:1], default=0.0)
-    end = min(depth.times[-1:] + color.times[-1:], default=0.0)
-    if end - start < _LEAST_SECONDS:
+    both = (depth.times, color.times)
+    if not all(both) or min(t[-1] for t in both) - max(t[0] for t in both) < _LEAST_SECONDS:
         raise WorkError(
             "Too few pictures came to measure the delay.", "Check both cameras, then measure again."
         )
+    start, end = max(t[0] for t in both), min(t[-1] for t in both)
     whole = _lag(depth, color, start, end)
     middle = 0.5 * (start + end)
     halves = [_lag(depth, color, *part)[0] for part in ((start, middle), (middle, end))]

@@ -230,7 +230,7 @@ class UvcSource:
         try:
             while time.monotonic() - asked_s < timeout_s:
                 packet = self.read()
-                if packet is None or packet.facts["time_s"] < asked_s - self.latency_s:
+                if packet is None or packet.facts["time_s"] < asked_s:
                     continue
                 if skip == 0:
                     return packet

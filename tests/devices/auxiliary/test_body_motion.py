@@ -30,7 +30,7 @@ def before() -> NDArray[np.float32]:
 def test_a_still_body_has_not_moved_whatever_the_noise(before: NDArray[np.float32]) -> None:
     motion = body_motion(before, seen(100), reduced_camera(CAMERA))
     assert motion is not None
-    assert motion.moved_m < 0.0015
+    assert motion.moved_m < 0.0025
 
 
 @pytest.mark.parametrize(

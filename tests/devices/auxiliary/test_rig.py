@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import threading
 import time
 from dataclasses import replace
@@ -141,14 +142,14 @@ def test_a_body_that_moved_before_the_picture_is_refused_with_the_figure() -> No
     assert pairing.moved_m == pytest.approx(0.02, abs=0.002)
     with pytest.raises(WorkError, match=r"moved by (19|20|21) mm between depth and picture \(1\.00 s\)"):
         pairing.judge()
-    assert trail.check(times[:9], picture_at(10.7)).judge() == (), "before that it was still"
+    assert trail.check(times[:9], picture_at(10.6)).judge() == (), "before that it was still"
 
 
 def test_a_small_movement_is_a_warning_with_the_figure() -> None:
     times = np.arange(10.0, 11.6, 0.05)
     pairing = trail_of(times, steps_aside(10.8, 0.008)).check(times[:9], picture_at(11.2))
     (warning,) = pairing.judge()
-    assert "moved by 8 mm between depth and picture" in warning
+    assert re.search(r"moved by [89] mm between depth and picture", warning)
 
 
 def test_a_picture_whose_moment_is_not_well_known_is_judged_by_the_worst() -> None:
