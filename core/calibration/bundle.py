@@ -27,7 +27,7 @@ _MAX_STEPS = 60
 _RELATION = ("rx", "ry", "rz", "tx", "ty", "tz")
 _DEPTH = ("scale", "offset")
 # How far from zero distortion coefficients of real lenses are: keeps the weakly seen ones from running off.
-_LENS_PRIOR = {"k1": 0.5, "k2": 1.0, "p1": 0.01, "p2": 0.01, "k3": 1.0}
+_LENS_PRIOR = {"k1": 0.5, "k2": 0.5, "p1": 0.002, "p2": 0.002, "k3": 0.3}
 
 
 @dataclass(frozen=True, eq=False)

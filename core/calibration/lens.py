@@ -30,6 +30,17 @@ LENS_MODELS: tuple[tuple[str, ...], ...] = (
 MIN_VIEWS = 4
 
 
+def guarded(model: tuple[str, ...]) -> tuple[str, ...]:
+    """The coefficients to refine for a model: one radial term more, and decentring.
+
+    What the views do not bear out is not zero but unknown within what lenses have (a prior holds it). Left
+    at zero, it would shift the principal point by several of its stated uncertainties.
+    """
+    radial = [n for n in ("k1", "k2", "k3") if n in model]
+    more = ("k1", "k2", "k3")[: min(len(radial) + 1, 3)]
+    return tuple(n for n in LENS_NAMES if n in more or n in ("p1", "p2"))
+
+
 @dataclass(frozen=True, eq=False)
 class LensFit:
     """One camera by itself.

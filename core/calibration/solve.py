@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from core.calibration.board import BoardSpec
 from core.calibration.bundle import Adjusted, Bundle, Noise, adjust, plane_at
 from core.calibration.depth_plane import PlaneDepth, plane_depth
-from core.calibration.lens import MIN_VIEWS, LensFit, fit_lens
+from core.calibration.lens import MIN_VIEWS, LensFit, fit_lens, guarded
 from core.calibration.profile import DepthCorrection
 from core.calibration.views import RigView
 from core.capture.rgbd import CameraRig
@@ -82,7 +82,8 @@ class RigSolution:
     depth_spread_m : float
         RMS of the depth residuals.
     lenses : tuple of (tuple of str)
-        Distortion coefficients that the views bear out, of the depth and the colour camera.
+        Distortion coefficients that the views bear out, of the depth and the colour camera; the others
+        (`core.calibration.lens.guarded`) are refined too, held by what lenses have.
     notes : tuple of str
     """
 
@@ -152,6 +153,7 @@ def solve_rig(
     start = Bundle(
         depth_lens.camera, None if color_lens is None else color_lens.camera, relation, 1.0, 0.0, []
     )
+    refined = (guarded(lenses[0]), guarded(lenses[1]))
     progress(0.5, "Measuring the board's depth")
     planes = _planes(views, spec, depth_lens, poses)
     adjusted, noise = (
@@ -167,7 +169,7 @@ def solve_rig(
         use = [int(k) for k in np.flatnonzero(kept)]
         _enough(views, use, has_color)
         begin = replace(start, poses=[poses[k] for k in use])
-        now = adjust([views[k] for k in use], [planes[k] for k in use], spec, begin, lenses, noise)
+        now = adjust([views[k] for k in use], [planes[k] for k in use], spec, begin, refined, noise)
         noise = _noise(now, [planes[k] for k in use])
         adjusted, start = now, now.bundle
         poses.update(zip(use, now.bundle.poses, strict=True))
