@@ -23,15 +23,15 @@ from devices.openni import cameras, runtime
 from devices.openni.oni_file import OniWriter
 from devices.openni.oni_layout import inspect_oni
 from tests.app.cli.cases import assert_told, geoderm
-from tests.devices.openni_driver.feed import FeedFolder, build_redist, make_feed
+from tests.devices.openni_driver.feed import FeedFolder, make_feed, shared_redist
 
 ROOT = Path(__file__).resolve().parents[3]
 SMALL = PinholeCamera(64, 48, 58.0, 58.0, 31.5, 23.5)
 
 
 @pytest.fixture(scope="module")
-def redist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    built = build_redist(tmp_path_factory.mktemp("openni") / "redist")
+def redist() -> Path:
+    built = shared_redist()
     if isinstance(built, str):
         pytest.skip(built)
     return built

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from tests.devices.openni_driver.feed import FeedFolder, build_redist, make_feed
+from tests.devices.openni_driver.feed import FeedFolder, make_feed, shared_redist
 
 
 @pytest.fixture(scope="session")
-def feed_redist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def feed_redist() -> Path:
     """The real runtime with the feeding driver beside its own."""
-    built = build_redist(tmp_path_factory.mktemp("openni") / "redist")
+    built = shared_redist()
     if isinstance(built, str):
         pytest.skip(built)
     return built

@@ -164,6 +164,21 @@ def test_compressed_colour_plays(tmp_path: Path) -> None:
     assert np.abs(frame.rgb.astype(int) - ramp).mean() < 3
 
 
+def test_a_recording_as_niviewer_makes_it_plays(feeds: Feeds, tmp_path: Path) -> None:
+    """The runtime's recorder with depth as 16zT and colour as JPEG."""
+    feed = feeds()
+    with OpenNICamera(feed.uri) as camera:
+        record(camera, tmp_path / "a.oni", limits(frames=5), lossy_color=True)
+    summary = inspect_oni(tmp_path / "a.oni")
+    assert {s.kind: s.codec for s in summary.streams.values()} == {"depth": "16zT", "color": "JPEG"}
+    with OniRecording(tmp_path / "a.oni") as recording:
+        frame = list(recording.frames())[1]
+    assert feed.color is not None
+    assert frame.rgb is not None
+    assert any(np.array_equal(frame.depth, made) for made in feed.depth)
+    assert np.abs(frame.rgb.astype(int) - feed.color[0]).mean() < 3
+
+
 def test_an_existing_recording_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "a.oni").write_bytes(b"mine")
     with pytest.raises(InputError, match="exists already"):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -49,6 +52,14 @@ def build_redist(target: Path) -> Path | str:
     if built.returncode != 0:
         return f"the driver does not compile here: {built.stderr[:300]}"
     return target
+
+
+@functools.cache
+def shared_redist() -> Path | str:
+    """As `build_redist`, made once in a process and removed when it ends."""
+    folder = tempfile.TemporaryDirectory(prefix="geoderm-openni-driver-")
+    atexit.register(folder.cleanup)
+    return build_redist(Path(folder.name) / "redist")
 
 
 @dataclass(frozen=True)
