@@ -10,6 +10,8 @@ import pytest
 from core.anchors import Joint, Skeleton, SkeletonTracker
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig
+from core.surface import BodyScan, scan_body
+from devices.simulator import SimulatedCapture, SimulatedPatient, make_rig
 
 MakeSkeleton = Callable[..., Skeleton]
 
@@ -61,3 +63,18 @@ def tracker() -> SkeletonTracker:
     from devices.trackers import default_tracker
 
     return default_tracker()
+
+
+@pytest.fixture(scope="session")
+def person() -> SimulatedPatient:
+    return SimulatedPatient("m_young_avg", seed=1, moles=5, lesions=1, freckles=0, rig=make_rig((1280, 960)))
+
+
+@pytest.fixture(scope="session")
+def psi(person: SimulatedPatient) -> SimulatedCapture:
+    return person.capture(stance="psi", view="front", frames=6, seed=3)
+
+
+@pytest.fixture(scope="session")
+def psi_scan(psi: SimulatedCapture) -> BodyScan:
+    return scan_body(psi.capture)

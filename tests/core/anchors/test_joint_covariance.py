@@ -22,8 +22,8 @@ from core.anchors.covariance import along_ray, hand_covariance, lifted_covarianc
 from core.anchors.detection import consensus
 from core.capture.rgbd import CameraRig
 from core.errors import InputError
-from core.surface import BodyScan, scan_body
-from devices.simulator import SimulatedCapture, SimulatedPatient, make_rig
+from core.surface import BodyScan
+from devices.simulator import SimulatedCapture
 
 KNOWN = {"visibility": 1.0, "spread_m": 0.0, "patch_m": 0.003, "ambiguity_m": 0.0, "relief": False}
 RAY = np.array([0.3, -0.2, 2.4])
@@ -79,16 +79,13 @@ def test_looks_that_differ_have_a_spread_and_one_look_has_none() -> None:
 
 
 @pytest.fixture(scope="module")
-def taken() -> SimulatedCapture:
-    rig = make_rig((1280, 960))
-    return SimulatedPatient("f_38_tall", seed=9, moles=4, lesions=1, freckles=0, rig=rig).capture(
-        "A", frames=9
-    )
+def taken(psi: SimulatedCapture) -> SimulatedCapture:
+    return psi
 
 
 @pytest.fixture(scope="module")
-def scan(taken) -> BodyScan:
-    return scan_body(taken.capture)
+def scan(psi_scan: BodyScan) -> BodyScan:
+    return psi_scan
 
 
 @pytest.fixture(scope="module")

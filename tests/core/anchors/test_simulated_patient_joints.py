@@ -17,26 +17,9 @@ from core.anchors import (
 )
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import WorkError
-from core.surface import BodyScan, scan_body
-from devices.simulator import SimulatedCapture, SimulatedPatient, make_rig
 
 # the model's torso joint sits at another height than the middle of the trunk
 DEFINED_ALIKE = [name for name in JOINT_NAMES if name != "torso"]
-
-
-@pytest.fixture(scope="module")
-def person() -> SimulatedPatient:
-    return SimulatedPatient("m_young_avg", seed=1, moles=5, lesions=1, freckles=0, rig=make_rig((1280, 960)))
-
-
-@pytest.fixture(scope="module")
-def psi(person: SimulatedPatient) -> SimulatedCapture:
-    return person.capture(stance="psi", view="front", frames=6, seed=3)
-
-
-@pytest.fixture(scope="module")
-def psi_scan(psi: SimulatedCapture) -> BodyScan:
-    return scan_body(psi.capture)
 
 
 def without_color(capture: RgbdCapture) -> RgbdCapture:
