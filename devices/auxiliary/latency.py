@@ -16,6 +16,8 @@ _MOST_LAG_S = 1.0
 _LEAST_LIKENESS = 0.6
 _LEAST_SECONDS = 2.0
 _FLOOR_S = 0.003
+_NEAR_S = 0.15
+_MOST_SIGMA_S = 0.06
 
 
 @dataclass(frozen=True)
@@ -89,17 +91,26 @@ def find_latency(depth: Movement, color: Movement) -> Latency:
     start, end = max(t[0] for t in both), min(t[-1] for t in both)
     whole = _lag(depth, color, start, end)
     middle = 0.5 * (start + end)
-    halves = [_lag(depth, color, *part)[0] for part in ((start, middle), (middle, end))]
     delay, likeness = whole
+    halves = [_lag(depth, color, *part, delay)[0] for part in ((start, middle), (middle, end))]
     if likeness < _LEAST_LIKENESS:
         raise WorkError(
             "The delay between the cameras could not be measured: they saw no common movement.",
             "Wave an arm slowly from side to side in front of both cameras, and nothing else.",
         )
-    return Latency(delay, float(np.hypot(_FLOOR_S, 0.5 * abs(halves[0] - halves[1]))), likeness)
+    sigma = float(np.hypot(_FLOOR_S, 0.5 * abs(halves[0] - halves[1])))
+    if sigma > _MOST_SIGMA_S:
+        raise WorkError(
+            "The delay between the cameras could not be measured: two halves of the recording disagree.",
+            "Wave an arm irregularly, now slowly, now fast, and measure again.",
+        )
+    return Latency(delay, sigma, likeness)
 
 
-def _lag(depth: Movement, color: Movement, start: float, end: float) -> tuple[float, float]:
+def _lag(
+    depth: Movement, color: Movement, start: float, end: float, near_s: float | None = None
+) -> tuple[float, float]:
+    """Delay and likeness in a span of time, anywhere or near a delay that is known roughly."""
     grid = np.arange(start, end, _GRID_S)
     a, b = (_normed(np.interp(grid, m.times, m.values)) for m in (depth, color))
     most = min(round(_MOST_LAG_S / _GRID_S), len(grid) // 2)
@@ -112,12 +123,14 @@ def _lag(depth: Movement, color: Movement, start: float, end: float) -> tuple[fl
             for k in lags
         ]
     )
+    if near_s is not None:
+        likeness[np.abs(np.array(lags) * _GRID_S - near_s) > _NEAR_S] = -np.inf
     best = int(likeness.argmax())
     shift = 0.0
     if 0 < best < len(lags) - 1:
         left, top, right = likeness[best - 1 : best + 2]
         bend = left - 2 * top + right
-        shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+        shift = 0.5 * (left - right) / bend if np.isfinite(bend) and bend < 0 else 0.0
     return float((lags[best] + shift) * _GRID_S), float(likeness[best])
 
 
