@@ -83,12 +83,12 @@ def correct_candidate(new: NewCapture, skeleton: Skeleton, progress: Progress = 
 def with_stored_corrections(
     store: ClinicStore, capture_id: int, analysed: AnalysedCapture
 ) -> AnalysedCapture:
-    """Worker: a fresh analysis of a stored capture with the joints that were once placed by hand.
+    """Worker: the analysis of a stored capture with the joints that were once placed by hand.
 
-    A place that no longer lies on the body (after the body finder changed, say) is left to the tracker, with
+    It is returned as it is if it has them already. A place that no longer lies on the body (after the body finder changed, say) is left to the tracker, with
     a warning.
     """
-    from core.anchors import JointPlacer, with_skeleton
+    from core.anchors import JointPlacer, by_hand, with_skeleton
     from core.anchors.names import spoken
 
     placed = {
@@ -96,7 +96,7 @@ def with_stored_corrections(
         for record in store.anchors.list(capture_id)
         if record.source == HAND and record.pixel_u is not None and record.pixel_v is not None
     }
-    if not placed:
+    if placed.keys() <= by_hand(analysed.skeleton).keys():
         return analysed
     placer = JointPlacer(analysed.capture.rig, analysed.scan.surface)
     skeleton = analysed.skeleton

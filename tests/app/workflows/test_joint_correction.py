@@ -57,6 +57,7 @@ def test_a_correction_moves_the_anchor_and_is_stored_as_done_by_hand(clinic: Cli
     )
     assert reopened.skeleton.joints["left_knee"].source == "hand"
     assert reopened.warnings == before.warnings
+    assert with_stored_corrections(clinic.store, number, reopened) is reopened
 
 
 def test_a_corrected_stance_is_judged_again(analysed: AnalysedCapture) -> None:
