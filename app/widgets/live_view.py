@@ -42,9 +42,8 @@ if TYPE_CHECKING:
 COUNT_SHARE: Final = 0.5
 """Height of the countdown's figures as a share of the view's."""
 
-_SENTENCE_PX: Final = 26
+_SENTENCE_PX: Final = (26, 22, 18)
 _BAND_PX: Final = 60
-_FAINT: Final = 130
 _STATE_COLORS: Final = {
     "good": palette.GREEN,
     "fair": palette.AMBER,
@@ -80,9 +79,9 @@ class LiveView(QWidget):
         return QSize(640, 480)
 
     def room(self) -> tuple[int, int]:
-        """Width and height in device pixels that a picture may take."""
+        """Width and height in device pixels that a picture may take: all but the band of the sentence."""
         ratio = self.devicePixelRatioF()
-        return round(self.width() * ratio), round(self.height() * ratio)
+        return round(self.width() * ratio), round((self.height() - _BAND_PX) * ratio)
 
     def show_picture(self, shown: Shown | None) -> None:
         """Show a picture from now on; None for none."""
@@ -174,9 +173,10 @@ class LiveView(QWidget):
             return QRectF()
         ratio = self.devicePixelRatioF()
         w, h = shown.image.width() / ratio, shown.image.height() / ratio
-        scale = min(1.0, self.width() / w, self.height() / h)
+        free = self.height() - _BAND_PX
+        scale = min(1.0, self.width() / w, free / h)
         w, h = w * scale, h * scale
-        return QRectF(round((self.width() - w) / 2), round((self.height() - h) / 2), w, h)
+        return QRectF(round((self.width() - w) / 2), round((free - h) / 2), w, h)
 
     def view_position(self, u: float, v: float) -> QPointF:
         """Where a pixel of the camera's picture is in the widget."""
@@ -275,32 +275,31 @@ class LiveView(QWidget):
         painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _paint_sentence(self, painter: QPainter) -> None:
+        band = QRectF(0, self.height() - _BAND_PX, self.width(), _BAND_PX)
         if not self._sentence or self._count:
             return
-        font = QFont(self.font())
-        font.setPixelSize(_SENTENCE_PX)
-        font.setWeight(QFont.Weight.DemiBold)
-        painter.setFont(font)
-        room = QRectF(self.rect()).adjusted(24, 0, -24, 0)
+        painter.fillRect(band, QColor(_STATE_COLORS.get(self._state, palette.SECONDARY)))
+        room = band.adjusted(24, 0, -24, 0)
         flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-        needed = painter.boundingRect(room, flags, self._sentence)
-        tall = max(needed.height() + 24, _BAND_PX)
-        band = QRectF(0, self.height() - tall, self.width(), tall)
-        color = QColor(_STATE_COLORS.get(self._state, palette.SECONDARY))
-        color.setAlpha(225)
-        painter.fillRect(band, color)
+        font = QFont(self.font())
+        font.setWeight(QFont.Weight.DemiBold)
+        for size in _SENTENCE_PX:
+            font.setPixelSize(size)
+            painter.setFont(font)
+            if painter.boundingRect(room, flags, self._sentence).height() <= _BAND_PX:
+                break
         painter.setPen(QColor("#FFFFFF"))
-        painter.drawText(band.adjusted(24, 0, -24, 0), flags, self._sentence)
+        painter.drawText(room, flags, self._sentence)
 
     def _paint_count(self, painter: QPainter) -> None:
         if not self._count:
             return
-        side = COUNT_SHARE * min(self.width(), self.height())
+        side = COUNT_SHARE * min(self.width(), self.height() - _BAND_PX)
         font = QFont(self.font())
         font.setPixelSize(max(48, round(0.8 * side)))
         font.setWeight(QFont.Weight.Bold)
         disc = QRectF(0, 0, side, side)
-        disc.moveCenter(QRectF(self.rect()).center())
+        disc.moveCenter(QRectF(0, 0, self.width(), self.height() - _BAND_PX).center())
         painter.setPen(QPen(QColor("#FFFFFF"), 6))
         dark = QColor(palette.TEXT)
         dark.setAlpha(190)

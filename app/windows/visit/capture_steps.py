@@ -66,6 +66,7 @@ class CaptureSteps(QObject):
         self._current: CaptureScreen | None = None
         self._shown: tuple[object, ...] | None = None
         self._pending: Judged | None = None
+        self._latest: Judged | None = None
         self._notes: dict[int, Judged] = {}
         self._ghost_key: tuple[object, ...] | None = None
         self._warned = False
@@ -137,7 +138,9 @@ class CaptureSteps(QObject):
         screen.secondary.setEnabled(ready or session.state is State.STANCE_CHECK)
         if session.state is State.STANCE_CHECK and candidate is not None:
             screen.secondary.setText("Use as it is")
-            screen.warnings.show_list("Please note", candidate.warnings)
+            latest = self._latest
+            notes = latest.sentences if latest is not None and latest.new is candidate else candidate.warnings
+            screen.warnings.show_list("Please note", notes)
             self._show_once(screen, ("candidate", id(candidate)), lambda: _show_new(screen, candidate))
         elif session.state is State.STANCE_DONE and session.snapshot.stance is not None:
             screen.secondary.setText("Capture again")
@@ -447,7 +450,9 @@ class CaptureSteps(QObject):
         screen = self._current
         if screen is not None:
             screen.stop_live()
-        if judged.stored is not None or not judged.new.good:
+        self._latest = judged
+        to_correct = not judged.new.good and judged.quality.grade != "refused"
+        if judged.stored is not None or to_correct:
             self._adopt(judged)
         else:
             self._pending = judged
