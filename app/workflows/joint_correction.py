@@ -85,8 +85,8 @@ def with_stored_corrections(
 ) -> AnalysedCapture:
     """Worker: the analysis of a stored capture with the joints that were once placed by hand.
 
-    It is returned as it is if it has them already. A place that no longer lies on the body (after the body finder changed, say) is left to the tracker, with
-    a warning.
+    It is returned as it is if it has them already. A place that no longer lies on the body (after the body
+    finder changed, say) is left to the tracker, with a warning.
     """
     from core.anchors import JointPlacer, by_hand, with_skeleton
     from core.anchors.names import spoken
