@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from core.anchors.lifting import relifted
 from core.anchors.names import BONES, opposite, spoken
-from core.anchors.skeleton import Skeleton
+from core.anchors.skeleton import Joint, Skeleton
 from core.capture.rgbd import CameraRig
 from core.errors import WorkError
 
@@ -100,7 +100,9 @@ def apply_calibration(skeleton: Skeleton, calibration: SkeletonCalibration, rig:
         residual = abs(float(np.linalg.norm(mended - root)) - length)
         side = "nearer to" if mended[2] < end[2] else "farther from"
         if residual <= _tolerance(length) / 2:
-            joints[far] = relifted(joints[far], mended, rig, 0.8 * joints[far].visibility)
+            joints[far] = _doubted(
+                relifted(joints[far], mended, rig, 0.8 * joints[far].visibility), mended - end
+            )
             warnings.append(
                 f"The depth of the {spoken(far)} did not fit the calibrated skeleton "
                 f"({found * 100:.0f} cm from the {spoken(near)} instead of {length * 100:.0f} cm); "
@@ -123,6 +125,13 @@ def _on_ray(origin: FloatArray, end: FloatArray, root: FloatArray, length: float
     now = float((end - origin) @ ray)
     best = min((foot - half, foot + half), key=lambda t: abs(t - now))
     return np.asarray(origin + best * ray)
+
+
+def _doubted(joint: Joint, shift: FloatArray) -> Joint:
+    """The joint with a covariance that knows it was moved: its depth was wrong, and is only inferred now."""
+    if joint.covariance_m2 is None:
+        return joint
+    return replace(joint, covariance_m2=joint.covariance_m2 + np.outer(shift, shift) / 4.0)
 
 
 def _mirrored(bone: Bone) -> Bone:

@@ -60,11 +60,16 @@ class LiveSkeleton:
     ----------
     follower : PictureFollower
         Belongs to this object, which closes it.
+
+    Attributes
+    ----------
+    closed : bool
     """
 
     def __init__(self, follower: PictureFollower) -> None:
         self._follower = follower
         self._lock = threading.Lock()
+        self.closed = False
         self._names: tuple[str, ...] = ()
         self._places = OneEuro()
         self._depths = OneEuro(Smoothing(rest_hz=1.5, hz_per_speed=4.0))
@@ -89,6 +94,7 @@ class LiveSkeleton:
     def close(self) -> None:
         """Release the tracker."""
         with self._lock:
+            self.closed = True
             self._follower.close()
 
     def update(

@@ -26,6 +26,7 @@ def open_live_skeleton() -> LiveSkeleton:
 
     live = LiveSkeleton(MediaPipeFollower())
     with _lock:
+        _open.difference_update([old for old in _open if old.closed])
         _open.add(live)
     return live
 

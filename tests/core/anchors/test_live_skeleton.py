@@ -176,5 +176,8 @@ def test_where_no_depth_is_there_is_no_place() -> None:
 
 def test_closing_releases_the_follower() -> None:
     follower = Script([])
-    LiveSkeleton(follower).close()
+    live = LiveSkeleton(follower)
+    assert not live.closed
+    live.close()
+    assert live.closed
     assert follower.closed

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -54,6 +56,17 @@ def test_a_joint_on_the_wall_behind_comes_back(name, jump, psi_points, make_skel
     (said,) = mended.warnings
     assert name.replace("_", " ") in said
     assert "nearer to the camera" in said
+
+
+def test_a_mended_joint_knows_that_its_depth_was_wrong(psi_points, make_skeleton, kinect_rig) -> None:
+    good = make_skeleton(psi_points)
+    skeleton = make_skeleton({**psi_points, "left_hand": psi_points["left_hand"] * 1.2})
+    hand = replace(skeleton.joints["left_hand"], covariance_m2=np.eye(3) * 1e-4)
+    mended = apply_calibration(skeleton.with_joint(hand), calibrate_skeleton(good), kinect_rig)
+    shift = np.linalg.norm(mended.point("left_hand") - hand.point_m)
+    variance = np.linalg.eigvalsh(mended.joints["left_hand"].covariance_m2)
+    np.testing.assert_allclose(variance[:2], 1e-4)
+    assert variance[2] == pytest.approx(1e-4 + shift**2 / 4)
 
 
 def test_an_elbow_that_cannot_fit_is_only_said(psi_points, make_skeleton, kinect_rig) -> None:
