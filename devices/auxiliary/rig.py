@@ -49,6 +49,7 @@ _BUILT_IN = frozenset(
 _PREVIEW_WIDTH = 320
 _MEASURE_S = 6.0
 _OPEN_TIMEOUT_S = 8.0
+_FIRST_FRAME_S = 30.0
 
 
 class RigCamera:
@@ -125,12 +126,14 @@ class RigCamera:
         return self._last
 
     def open(self) -> None:
-        """Open both cameras; a camera that streams is waited for until its first picture."""
+        """Open both cameras and wait until each that streams has delivered."""
         try:
             self._depth.open()
             self._color.open()
             self._trail = DepthTrail(self._depth.rig.depth)
             self.start(self._streams)
+            if self._depth_frame(0, _FIRST_FRAME_S) is None:
+                raise WorkError("The depth camera delivers no frames.", "Unplug and reconnect it.")
             if self._color.streams and self._picture is None:
                 self._newest_picture(_OPEN_TIMEOUT_S)
                 if self._picture is None:
