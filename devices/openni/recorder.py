@@ -7,7 +7,7 @@ import queue
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +34,7 @@ MAX_WAITING = 60
 MIN_FREE_BYTES = 100_000_000
 _SILENCE_S = 5.0
 _FIRST_FRAME_S = 30.0
+_LEAST_SHARE, _MOST_LEFT_OUT = 0.8, 10
 
 
 @dataclass(frozen=True)
@@ -297,12 +298,14 @@ def _record_with_runtime(
                 break
     except GeodermError as error:
         failure = error
-    _quietly(camera.stop_recording)
+    try:
+        camera.stop_recording()
+        whole = _ends(partial)
+    except GeodermError:  # the process is gone, and with it the recorder
+        whole = False
     kept = _kept(partial, path)
     if not kept[0]:
-        raise failure or WorkError(
-            f"{path}: the recording could not be written.", "Check the folder's free space and permissions."
-        )
+        raise failure or _incomplete(path, 0)
     try:
         write_calibration(
             path,
@@ -319,6 +322,8 @@ def _record_with_runtime(
             f"{failure.message} The {kept[0]} frames until then are kept in {path}.", failure.advice
         ) from failure
     left_out = max(seen - first.number - kept[0], 0)
+    if not whole or left_out > max(_MOST_LEFT_OUT, (1 - _LEAST_SHARE) * (seen - first.number)):
+        raise _incomplete(path, kept[0])
     return RecordingReport(path, kept[0], kept[1], left_out, "OpenNI2", ended)
 
 
@@ -344,16 +349,24 @@ def _kept(partial: Path, path: Path) -> tuple[int, float]:
     return depth.frames, depth.last_s - depth.first_s
 
 
+def _incomplete(path: Path, frames: int) -> WorkError:
+    """The runtime's recorder does not tell that a disk is full: its file lacks frames, or its end."""
+    kept = f" {frames} frames are kept." if frames else ""
+    return WorkError(
+        f"{path}: the disk did not take the whole recording.{kept}",
+        "Check the folder's free space and permissions.",
+    )
+
+
+def _ends(path: Path) -> bool:
+    try:
+        return inspect_oni(path).end > 0
+    except InputError:
+        return False
+
+
 def _playable(path: Path) -> bool:
     try:
         return inspect_oni(path).playable
     except InputError:
         return False
-
-
-def _quietly(action: Callable[[], None]) -> None:
-    """Do what the failure that is being told may have made impossible."""
-    try:
-        action()
-    except GeodermError:
-        return

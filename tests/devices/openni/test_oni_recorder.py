@@ -225,6 +225,22 @@ def test_a_full_disk_is_told_and_what_fitted_is_a_complete_recording(
     assert {p.name for p in tmp_path.iterdir()} == {"a.oni"}
 
 
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="limits of another process are Linux")
+def test_a_full_disk_under_the_runtimes_recorder_is_told_and_what_fitted_is_kept(
+    feeds: Feeds, tmp_path: Path
+) -> None:
+    """The recorder itself says nothing, and dies when it is stopped."""
+    with OpenNICamera(feeds().uri) as camera:
+        assert camera.latest(0, 5.0) is not None
+        assert camera.runtime_pid is not None
+        limit = (6_000_000, resource.RLIM_INFINITY)
+        resource.prlimit(camera.runtime_pid, resource.RLIMIT_FSIZE, limit)
+        with pytest.raises(WorkError, match=r"did not take the whole recording\. \d+ frames are kept"):
+            record(camera, tmp_path / "a.oni", limits(frames=30))
+    with OniRecording(tmp_path / "a.oni") as recording:
+        assert len(list(recording.frames())) >= 2
+
+
 def test_a_disk_that_is_full_from_the_start_leaves_nothing(
     tmp_path: Path, small_disk: Callable[[int], None]
 ) -> None:
