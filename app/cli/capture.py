@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LEAST_COVERAGE = 0.5
 """With less of the body's outline measured, skin is missing nearly everywhere: not a capture to keep."""
 
-_STILL_M = 0.004
+_STILL_M = 0.006
 _STILL_FOR_S = 1.0
 _LOOK_BACK_S = 0.5
 
@@ -124,7 +124,7 @@ class _Shown:
 
 
 def _wait_until_still(camera: LiveCamera, wait_s: float) -> None:
-    """Return when the body has moved less than 4 mm in half a second, for a second."""
+    """Return when the body has moved less than 6 mm in half a second, for a second."""
     from devices.auxiliary.pairing import DepthTrail
 
     trail = DepthTrail(camera.rig.depth)

@@ -19,6 +19,9 @@ WARN_M = 0.004
 REFUSE_M = 0.015
 """Farther than this, a click in the picture would land on other skin: the capture is refused."""
 
+WARN_BURST_M = 0.010
+"""Within the depth frames: more than the sway and breath of a standing person, 4 to 6 mm in a second."""
+
 _REMEMBERED_S = 20.0
 _AROUND_S = 0.12
 _SHORT_GAP_S = 0.15
@@ -69,7 +72,7 @@ class PairedMotion:
                 f"The body moved by {1000 * self.moved_m:.0f} mm between depth and picture "
                 f"({abs(self.gap_s):.2f} s)."
             )
-        if self.burst_moved_m is not None and self.burst_moved_m > WARN_M:
+        if self.burst_moved_m is not None and self.burst_moved_m > WARN_BURST_M:
             found.append(f"The body moved by {1000 * self.burst_moved_m:.0f} mm while depth was taken.")
         return tuple(found)
 
