@@ -16,11 +16,17 @@ COMMANDS = [
     "demo",
     "capture-info",
     "relocate",
+    "relocate-batch",
+    "verify-site",
     "geodesics",
     "simulate",
     "records",
     "evaluate",
     "devices",
+    "calibrate",
+    "capture",
+    "record",
+    "play",
 ]
 
 
