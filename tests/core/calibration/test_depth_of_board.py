@@ -1,4 +1,4 @@
-"""Depth of the board's plane is averaged to well under the steps of the sensor; guidance knows what is missing."""
+"""Depth of the board is averaged to well under the sensor's steps; the guidance knows what is missing."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def test_what_cannot_be_right_is_refused_with_its_field(tmp_path: Path, change: 
 def test_foreign_files_are_refused(tmp_path: Path, text: bytes) -> None:
     path = tmp_path / "p.json"
     path.write_bytes(text)
-    with pytest.raises(InputError, match="p.json"):
+    with pytest.raises(InputError, match=r"p\.json"):
         read_profile(path)
 
 
@@ -164,7 +164,7 @@ def _paths(node: object, at: tuple[object, ...] = ()) -> list[tuple[object, ...]
     return found
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_a_mutated_profile_is_either_refused_or_usable(data: st.DataObject) -> None:
     document = copy.deepcopy(profile(version=1).document())

@@ -79,7 +79,9 @@ def test_noisier_corners_are_stated_as_less_certain(usual) -> None:
 
 def test_a_view_in_which_the_board_moved_between_the_cameras_is_left_out(usual) -> None:
     board_rig, views, solution = usual
-    moved = replace(views[7], color=replace(views[7].color, pixels=views[7].color.pixels + (4.0, -2.0)))
+    moved = replace(
+        views[7], color=replace(views[7].color, pixels=views[7].color.pixels + np.array([4.0, -2.0]))
+    )
     again = solve_rig([*views[:7], moved, *views[8:]], SPEC)
     assert [v.number for v in again.views if not v.used] == [7]
     assert again.views[7].reason
