@@ -230,6 +230,10 @@ def test_a_follow_up_shows_the_outline_of_the_last_visit_and_asks_about_a_doubtf
     assert desk.state is State.CAPTURE, "a doubtful capture is not stored unasked"
     assert "Usable, with doubts" in desk.screen.verdict.text()
     assert "cut off" in desk.screen.verdict.text()
+    desk.click("capture_secondary")
+    assert desk.assist.counting, "Capture again counts down again"
+    desk.idle()
+    assert "Usable, with doubts" in desk.screen.verdict.text()
     desk.click("capture_primary")
     desk.idle()
     assert desk.state is State.CAPTURE_DONE

@@ -18,6 +18,9 @@ _TICK_MS: Final = 40
 _SETTLE_S: Final = 0.35
 """A sentence must hold for this long before it takes the place of another: nobody can follow a flicker."""
 
+_PASSING: Final = ("blur", "stillness")
+"""Readings that everybody who moves makes bad: no reason for alarm."""
+
 WELL: Final = "Well placed and still."
 HOLD: Final = "Well placed. Hold still."
 
@@ -73,7 +76,7 @@ class LiveAssist(QObject):
                 old.live_view.show_picture(None)
                 old.live_view.room_changed.disconnect(live.set_room)
                 old.live_view.visible_changed.disconnect(live.look)
-            if self.assistant.phase is not Phase.TAKING:
+            if old is not None and self.assistant.phase is not Phase.TAKING:
                 self.assistant.rest()
             if screen is not None:
                 screen.live_view.room_changed.connect(live.set_room)
@@ -139,7 +142,7 @@ class LiveAssist(QObject):
     @Slot()
     def _on_guidance(self) -> None:
         guidance, screen = self._deck.live.guidance, self._screen
-        if guidance is None or screen is None:
+        if guidance is None or screen is None or self._deck.status.kind != "streaming":
             return
         screen.strip.show_guidance(guidance)
         now = time.monotonic()
@@ -183,7 +186,7 @@ def _sentence(guidance: Guidance, assistant: CaptureAssistant) -> tuple[str, str
         return ("" if first is None else first.sentence, "unknown")
     for reading in sorted(guidance.readings.values(), key=lambda r: -r.badness):
         if reading.badness and reading.sentence:
-            if reading.name == "stillness" and assistant.message:
-                return assistant.message, reading.state
+            if reading.name in _PASSING:
+                return assistant.message or reading.sentence, "fair"
             return reading.sentence, reading.state
     return (WELL if guidance.still else HOLD, "good")
