@@ -160,6 +160,7 @@ class _Problem:
         bundle = self.unpack(x)
         rows: list[FloatArray] = []
         blocks: list[FloatArray] = []
+        self.ends: list[int] = []
         for k, view in enumerate(self.views):
             place = slice(self.shared + 6 * k, self.shared + 6 * k + 6)
             pose = x[place]
@@ -178,6 +179,7 @@ class _Problem:
                 value, gradient = self._depth(x, bundle, plane, pose, place)
                 rows.append(np.array([value / sigma]))
                 blocks.append(gradient[None] / sigma)
+            self.ends.append(sum(map(len, rows)))
         for name, spread in _LENS_PRIOR.items():
             for prefix in ("depth", "color"):
                 if (index := self.at.get(f"{prefix}.{name}")) is not None:
@@ -269,7 +271,7 @@ def adjust(
     bundle = problem.unpack(x)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-30))
     whole = np.linalg.pinv(normal * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
-    covariance: FloatArray = np.asarray(whole, float)[: problem.shared, : problem.shared]
+    covariance = _by_view(problem, x, np.asarray(whole, float))
     infrared, color, depth = [], [], np.full(len(views), np.nan)
     for k, (view, pose) in enumerate(zip(views, bundle.poses, strict=True)):
         infrared.append(_off(bundle.depth, pose, view.infrared, spec))
@@ -309,6 +311,28 @@ def _minimise(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]
         if gained < 1e-7 * cost:
             break
     return x, normal
+
+
+def _by_view(problem: _Problem, x: FloatArray, whole: FloatArray) -> FloatArray:
+    """Covariance of the shared parameters, widened where the corners of a picture err together.
+
+    A hand that moves between two exposures, or a bent board, shifts many corners alike, which independent
+    noise does not explain. Summing the pull of each view on the parameters (the sandwich estimator, Liang and
+    Zeger, Biometrika 1986, with the views as clusters) sees it; the wider of both is stated.
+    """
+    residual, jacobian = problem.evaluate(x)
+    starts = [0, *problem.ends[:-1]]
+    pulls = np.array([jacobian[a:b].T @ residual[a:b] for a, b in zip(starts, problem.ends, strict=True)])
+    shared = problem.shared
+    moved = pulls @ whole[:, :shared]
+    views = len(problem.views)
+    # With about eight numbers a view that the parameters share, few views look better than they are.
+    correction = views / max(views - shared / 3.0, views / 4.0)
+    clustered = correction * moved.T @ moved
+    independent = whole[:shared, :shared]
+    ratio = np.diag(clustered) / np.maximum(np.diag(independent), 1e-300)
+    widen = np.sqrt(np.maximum(ratio, 1.0))
+    return np.asarray(independent * np.outer(widen, widen))
 
 
 def plane_at(camera: PinholeCamera, depth_from_board: RigidTransform, pixel: tuple[float, float]) -> float:
