@@ -87,6 +87,7 @@ def ladder(
     With --out a run that was stopped goes on where it was.
     """
     from app.cli.simulated_cases import simulator_code
+    from core.capture.sensors import sensor_model
 
     rungs = chosen_rungs(methods, joints, frames, appearance)
     chosen = simulated_pairs(split)[: pairs or None]
@@ -95,7 +96,8 @@ def ladder(
         "captures": f"simulated, {sensor}, {split} split, "
         f"{len(chosen)} pairs of {len({p.shape for p in chosen})} bodies"
     }
-    _run(source, rungs, about, out, _options(delta_m), seed, keep, simulator_code())
+    captures_code = f"{simulator_code()} {sensor_model(sensor).fingerprint}"
+    _run(source, rungs, about, out, _options(delta_m), seed, keep, captures_code)
 
 
 def captures(
@@ -136,6 +138,7 @@ def residuals(
     appearance: str = _APPEARANCE,
     cache: Path | None = _CACHE,
     seed: int = _SEED,
+    sensor: str = _SENSOR,
     keep: bool = _KEEP,
 ) -> None:
     """Write the error and the stated region of every lesion: raw material for calibration.
@@ -143,13 +146,14 @@ def residuals(
     Measurements are kept beside the file (.jsonl); a run that was stopped goes on where it was.
     """
     from app.cli.simulated_cases import simulator_code
+    from core.capture.sensors import sensor_model
     from core.evaluation import run_ladder, write_residuals
 
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder does not exist.", "Create it or choose another.")
     rungs = chosen_rungs(methods, joints, frames, appearance)
-    source = _simulated(simulated_pairs(split)[: pairs or None], rungs, cache)
-    code = f"{measured_code()} {simulator_code()} seed {seed}"
+    source = _simulated(simulated_pairs(split)[: pairs or None], rungs, cache, sensor)
+    code = f"{measured_code()} {simulator_code()} {sensor_model(sensor).fingerprint} seed {seed}"
     journal = _journal(out.with_suffix(".jsonl"), code, keep)
     records = run_ladder(source, rungs, journal, seed=seed, progress=tell)
     typer.echo(f"{out}: {write_residuals(records, out)} rows")

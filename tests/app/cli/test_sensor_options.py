@@ -26,6 +26,7 @@ def test_a_capture_of_another_sensor_has_its_image_and_names_it(tmp_path: Path) 
         ("simulate", "FOLDER/out"),
         ("evaluate", "ladder", "--pairs", "1"),
         ("evaluate", "sensors", "--pairs", "1"),
+        ("evaluate", "residuals", "--out", "FOLDER/residuals.csv", "--pairs", "1"),
     ],
     ids=" ".join,
 )
