@@ -1,4 +1,4 @@
-"""The calibration wizard, driven with mouse and keys on a simulated board, to a saved calibration and beyond."""
+"""The calibration wizard, driven with mouse and keys on a simulated board, to a saved calibration."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SEED = 3
 HELD = 5
 """Frames for which the hand of the tests holds each pose of the board."""
 
-POSES = 26
+POSES = 40
 
 
 class HeldBoard:
@@ -193,8 +193,8 @@ def test_from_the_list_of_cameras_to_a_saved_calibration_that_the_next_capture_u
     table.selectRow(0)  # type: ignore[attr-defined]
     desk.click("collect_remove")
     removed = wizard.views
-    wizard.collect(22)
-    assert removed < 22
+    wizard.collect(15)
+    assert removed < 15
     assert desk.find("calibration_color_gauge", CoverageGauge).filled() >= 12
     assert "px" in desk.text("collect_rms")
     wizard.shoot("3-collecting")
@@ -205,7 +205,7 @@ def test_from_the_list_of_cameras_to_a_saved_calibration_that_the_next_capture_u
     wizard.shoot("4-result")
     assert desk.text("result_headline") in ("This calibration is good", "This calibration can be used")
     rows = {cells[0]: cells[1:] for cells in wizard.table("result_parameters")}
-    focal, bound = rows["Depth camera: focal length, across"]
+    focal, bound = rows["Depth: focal length, across"]
     truth = wizard.rigs.opened[-1].truth.rig
     assert float(focal.split()[0]) == pytest.approx(truth.depth.fx, rel=0.003)
     assert bound.startswith("± ")
@@ -232,7 +232,7 @@ def test_from_the_list_of_cameras_to_a_saved_calibration_that_the_next_capture_u
     desk.find("calibration_check_page", timeout_s=60)
     desk.wait_until(lambda: again.sheet.check.result is not None, "the check", 60)
     again.shoot("5-check-ok")
-    assert desk.text("check_headline") == "The cameras stand as calibrated"
+    assert desk.text("check_headline") == "OK, nothing has moved"
     assert load_checks(again.folder)[kept.id].verdict == "ok"
 
     # the same rig after a knock: the check says so, and so does the list
@@ -241,9 +241,8 @@ def test_from_the_list_of_cameras_to_a_saved_calibration_that_the_next_capture_u
     wizard.rigs.make = lambda: QuickBoardCamera(knocked)
     desk.wait_until(lambda: desk.is_shown("calibration_check"), "the list")
     desk.click("calibration_check")
-    desk.wait_until(lambda: again.sheet.check.result is not None, "the check", 60)
+    desk.wait_until(lambda: "was moved" in again.sheet.check.headline.text(), "the check", 60)
     again.shoot("5-check-moved")
-    assert "was moved" in desk.text("check_headline")
     desk.click("check_back")
     desk.wait_until(lambda: "was moved" in again.table("calibration_cameras")[0][3], "the warning")
     again.shoot("1-cameras-moved")
@@ -313,9 +312,11 @@ def test_a_camera_that_shows_infrared_or_colour_is_guided_through_the_change(wiz
     wizard.to_collecting()
     assert "infrared or colour, not both" in desk.text("collect_wish")
     assert not desk.is_shown("collect_take")
+    desk.main.resize(desk.main.minimumSize())
     infrared = desk.find("calibration_infrared", BoardPicture)
     desk.wait_until(lambda: infrared.showing, "the infrared picture", 60)
     wizard.shoot("3-exclusive")
+    wizard.collect(2)  # colour, infrared and colour again, for each of them
 
 
 def test_closing_the_window_while_collecting_ends_the_thread(wizard: Wizard) -> None:

@@ -57,6 +57,7 @@ class BoardPage(Page):
         steps.addLayout(papers)
         self.fits = label("", "caption", "board_fits", wrap=True)
         steps.addWidget(self.fits)
+        steps.addSpacing(16)
         steps.addWidget(label("2   Print it at 100 %, without fitting it to the page", "strong"))
         self.save = button("Save the board as PDF", "secondary", "board_save_pdf", self._save)
         row = QHBoxLayout()
@@ -65,6 +66,7 @@ class BoardPage(Page):
         steps.addLayout(row)
         self.saved = label("", "caption", "board_saved", wrap=True)
         steps.addWidget(self.saved)
+        steps.addSpacing(16)
         steps.addWidget(label("3   Measure the print", "strong"))
         self.width_edit = line_edit("board_width", "for example 377.6")
         self.width_edit.setMaximumWidth(220)
@@ -150,7 +152,7 @@ class BoardSketch(QWidget):
         page_w, page_h = PAPERS_M[self._paper]
         painter = QPainter(self)
         foot = 44
-        scale = min(self.width() / page_w, (self.height() - foot) / page_h)
+        scale = min((self.width() - 4) / page_w, (self.height() - foot - 4) / page_h)
         if self._paper == "A4":
             scale *= 0.78
         w, h = page_w * scale, page_h * scale

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from core.calibration.daily_check import CheckResult
 
 _HEADLINES = {
-    "ok": ("The cameras stand as calibrated", "success", palette.GREEN),
+    "ok": ("OK, nothing has moved", "success", palette.GREEN),
     "moved": ("The rig was moved: calibrate it again", "warning", palette.AMBER),
     "cannot tell": ("This could not be told", "info", palette.SECONDARY),
 }
@@ -153,6 +153,6 @@ def _numbers(result: CheckResult) -> str:
         )
     if result.depth_error_mm == result.depth_error_mm:
         parts.append(
-            f"depth {result.depth_error_mm:+.0f} mm (up to {result.depth_limit_mm:.0f} mm is normal)"
+            f"depth {round(result.depth_error_mm):+d} mm (up to {result.depth_limit_mm:.0f} mm is normal)"
         )
     return "; ".join(parts)

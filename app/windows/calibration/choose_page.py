@@ -33,9 +33,8 @@ class ChoosePage(Page):
         self._cameras: dict[str, KnownCamera] = {}
         self.body.addWidget(
             label(
-                "A calibration tells how the depth camera and the colour camera see the same place. It is "
-                "made once for each pair, and again when one of them was moved. The daily check takes ten "
-                "seconds.",
+                "A calibration is needed once for each pair of cameras, and again when one of them "
+                "was moved. The daily check takes ten seconds.",
                 "secondary",
                 wrap=True,
             )

@@ -16,7 +16,7 @@ from app.windows.calibration.wording import rms_in_words
 from app.windows.calibration.work import Findings
 from app.workflows.calibrating import Outcome
 
-_SIDE_W = 380
+_SIDE_W = 364
 _SIGNS = {
     Outcome.NOTHING: ("info", palette.SECONDARY),
     Outcome.REFUSED: ("move", palette.AMBER),
@@ -53,10 +53,11 @@ class CollectPage(Page):
         across.setSpacing(16)
         self.color = BoardPicture("calibration_color", "Waiting for the colour picture")
         self.infrared = BoardPicture("calibration_infrared", "Waiting for the infrared picture")
+        self._together, self._gone = True, False
         self.color_gauge = CoverageGauge("calibration_color_gauge")
         self.infrared_gauge = CoverageGauge("calibration_infrared_gauge")
-        self.color_column = _column("Colour camera", self.color)
-        self.infrared_column = _column("Depth camera, infrared picture", self.infrared)
+        self.color_column = _column("Colour camera", self.color, self.color_gauge)
+        self.infrared_column = _column("Depth camera, infrared picture", self.infrared, self.infrared_gauge)
         across.addWidget(self.infrared_column, 1)
         across.addWidget(self.color_column, 1)
         across.addWidget(self._side())
@@ -104,23 +105,10 @@ class CollectPage(Page):
         column = QVBoxLayout(side)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(8)
-        gauges = QHBoxLayout()
-        gauges.setSpacing(8)
-        self.gauge_columns = []
-        for name, gauge in (("Infrared", self.infrared_gauge), ("Colour", self.color_gauge)):
-            box = QWidget()
-            inner = QVBoxLayout(box)
-            inner.setContentsMargins(0, 0, 0, 0)
-            inner.setSpacing(4)
-            inner.addWidget(label(name, "field"))
-            inner.addWidget(gauge)
-            self.gauge_columns.append(box)
-            gauges.addWidget(box, 1)
-        column.addLayout(gauges)
         self.rms = label("", "caption", "collect_rms", wrap=True)
         column.addWidget(self.rms)
         frame, inner = card(margin=4)
-        self.views = RowTable([Column("View", 60), Column("Where"), Column("Tilt", 128), Column("m", 58)])
+        self.views = RowTable([Column("#", 46), Column("Where"), Column("Tilt", 124), Column("m", 54)])
         self.views.setObjectName("collect_views")
         self.views.setAccessibleName("Views taken")
         self.views.verticalHeader().setDefaultSectionSize(34)
@@ -139,7 +127,6 @@ class CollectPage(Page):
         for picture in (self.color, self.infrared):
             picture.clear()
         self.color_column.setVisible(has_color)
-        self.gauge_columns[1].setVisible(has_color)
         self.take_button.setVisible(together)
         self.views.set_rows([])
         self._say(Outcome.NOTHING, "Hold the board before the cameras.")
@@ -152,7 +139,7 @@ class CollectPage(Page):
         self.counter.setText("0")
         self.bar.setValue(0)
         self.rms.setText("Error of the corners: " + rms_in_words({}))
-        self._together = together
+        self._together, self._gone = together, False
         self._refresh()
 
     def show_tick(self, tick: Tick) -> None:
@@ -187,20 +174,26 @@ class CollectPage(Page):
             self.color.show_coverage(found.coverage.color)
             if found.coverage.color is not None:
                 self.color_gauge.show_coverage(found.coverage.color)
-            missing = found.coverage.missing()
-            if self._together and missing:
-                self.wish.setText(f"Still wanted: {missing[0][0].lower()}{missing[0][1:]}.")
-            elif self._together and found.ready:
-                self.wish.setText("Enough of everything: calibrate, or go on for a better result.")
+        if self._together:
+            said = found.step.message
+            missing = [text for text in found.coverage.missing() if text not in said]
+            if found.ready:
+                self.wish.setText("There is enough of everything: calibrate.")
+            else:
+                self.wish.setText(f"{missing[0]}." if missing else "")
         self.rms.setText(f"Error of the corners: {rms_in_words(found.rms_px)}")
+        self._gone = False
         self._refresh()
 
     def lost(self, message: str, advice: str) -> None:
         """The camera does not deliver any more."""
         self.banner.show_error(message, advice, [("open_again", "Open the camera again")])
         for picture in (self.color, self.infrared):
-            picture.show_frame(None, picture._corners[:0])
+            picture.show_gone()
         self._say(Outcome.NOTHING, "The camera is not there.")
+        self.wish.setText("The views taken so far are kept.")
+        self._gone = True
+        self._refresh()
 
     def _say(self, outcome: Outcome, message: str) -> None:
         name, color = _SIGNS[outcome]
@@ -215,7 +208,7 @@ class CollectPage(Page):
         found = self.findings
         self.solve_button.setEnabled(found is not None and found.can_solve)
         self.solve_button.setToolTip("" if self.solve_button.isEnabled() else "Possible from six views on")
-        self.take_button.setEnabled(found is not None)
+        self.take_button.setEnabled(found is not None and not self._gone)
         self.remove_button.setEnabled(self.views.selected() is not None)
 
     def _remove(self) -> None:
@@ -241,7 +234,7 @@ class CollectPage(Page):
         )
 
 
-def _column(title: str, picture: BoardPicture) -> QWidget:
+def _column(title: str, picture: BoardPicture, below: QWidget | None = None) -> QWidget:
     made = QWidget()
     column = QVBoxLayout(made)
     column.setContentsMargins(0, 0, 0, 0)
@@ -250,4 +243,8 @@ def _column(title: str, picture: BoardPicture) -> QWidget:
     style_class(heading, "field")
     column.addWidget(heading)
     column.addWidget(picture, 1)
+    if below is not None:
+        column.addSpacing(4)
+        column.addWidget(below)
+    column.addStretch(0)
     return made

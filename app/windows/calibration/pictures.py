@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.theme import palette
@@ -37,12 +37,18 @@ class BoardPicture(QWidget):
         self._corners: NDArray[np.float64] = np.zeros((0, 2))
         self._regions: NDArray[np.int64] | None = None
         self._paused = False
+        self._note = ""
         self._flash = 0
         self._timer = QTimer(self, interval=_FLASH_MS)
         self._timer.timeout.connect(self._fade)
 
     def sizeHint(self) -> QSize:  # noqa: D102
         return QSize(480, 360)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102
+        super().resizeEvent(event)
+        width, height = (4, 3) if self._shown is None else self._shown.source_size
+        self.setMaximumHeight(max(self.minimumHeight(), round(self.width() * height / width)))
 
     @property
     def corner_count(self) -> int:
@@ -54,9 +60,16 @@ class BoardPicture(QWidget):
         """Whether there is a picture that is not paused."""
         return self._shown is not None and not self._paused
 
+    def show_gone(self) -> None:
+        """The camera is not there: the last picture stays, dimmed."""
+        self._corners, self._paused = np.zeros((0, 2)), self._shown is not None
+        self._note = "No picture"
+        self.update()
+
     def show_frame(self, shown: Shown | None, corners: NDArray[np.float64]) -> None:
         """Paint another picture; without one the last stays, dimmed: the camera shows something else now."""
         self._paused = shown is None and self._shown is not None
+        self._note = "Waiting: the other camera is looking"
         if shown is not None:
             self._shown, self._corners = shown, corners
         else:
@@ -93,15 +106,17 @@ class BoardPicture(QWidget):
         width, height = self._shown.source_size
         scale = min(self.width() / width, self.height() / height)
         w, h = width * scale, height * scale
-        return QRectF((self.width() - w) / 2, (self.height() - h) / 2, w, h)
+        return QRectF((self.width() - w) / 2, 0.0, w, h)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.fillRect(self.rect(), QColor(palette.PHOTO_BACKGROUND))
         if self._shown is None:
+            height = min(self.height(), round(0.75 * self.width()))
+            room = QRectF(0, 0, self.width(), height)
+            painter.fillRect(room, QColor(palette.PHOTO_BACKGROUND))
             painter.setPen(QColor(palette.FAINT))
-            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._waiting)
+            painter.drawText(room, Qt.AlignmentFlag.AlignCenter, self._waiting)
             return
         place = self._place()
         painter.drawImage(place, self._shown.image)
@@ -110,7 +125,7 @@ class BoardPicture(QWidget):
         if self._paused:
             painter.fillRect(place, QColor(29, 39, 44, 170))
             painter.setPen(QColor("#FFFFFF"))
-            painter.drawText(place, Qt.AlignmentFlag.AlignCenter, "Waiting: the other camera is looking")
+            painter.drawText(place, Qt.AlignmentFlag.AlignCenter, self._note)
         self._paint_corners(painter, place)
         if self._flash:
             painter.fillRect(place, QColor(255, 255, 255, 18 * self._flash))
@@ -127,7 +142,7 @@ class BoardPicture(QWidget):
                 cell = QRectF(place.x() + column * w, place.y() + row * h, w, h)
                 if share > 0:
                     green = QColor(palette.GREEN)
-                    green.setAlpha(round(70 * share))
+                    green.setAlpha(round(50 * share))
                     painter.fillRect(cell, green)
         painter.setPen(QPen(QColor(255, 255, 255, 70), 1))
         for column in range(1, columns):
@@ -151,16 +166,17 @@ class BoardPicture(QWidget):
 
 
 class CoverageGauge(QWidget):
-    """Which distances and tilts the views of a camera have, as rows of dots to be filled."""
+    """Which distances and tilts the views of a camera have, as dots to be filled."""
 
-    ROW_H, NAME_W, DOT = 24, 118, 10
+    ROW_H, DOT, GAP = 22, 9, 5
+    COLUMNS = ((0, 3, 0, 62), (3, 8, 138, 116))  # rows from, to; left edge, width of the names
 
     def __init__(self, object_name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName(object_name)
         self._rows: list[tuple[str, int, int]] = [(name, 0, wanted) for name, wanted in _WANTED]
-        self.setFixedHeight(len(self._rows) * self.ROW_H)
-        self.setMinimumWidth(self.NAME_W + 4 * (self.DOT + 6))
+        self.setFixedHeight(5 * self.ROW_H)
+        self.setMinimumWidth(280)
 
     def show_coverage(self, coverage: CameraCoverage) -> None:
         """Fill the dots."""
@@ -179,18 +195,21 @@ class CoverageGauge(QWidget):
         font = painter.font()
         font.setPixelSize(13)
         painter.setFont(font)
-        for k, (name, n, wanted) in enumerate(self._rows):
-            y = k * self.ROW_H
-            done = n >= wanted
-            painter.setPen(QColor(palette.SECONDARY if done else palette.TEXT))
-            painter.drawText(QRectF(0, y, self.NAME_W, self.ROW_H), Qt.AlignmentFlag.AlignVCenter, name)
-            for dot in range(wanted):
-                box = QRectF(
-                    self.NAME_W + dot * (self.DOT + 6), y + (self.ROW_H - self.DOT) / 2, self.DOT, self.DOT
-                )
-                painter.setPen(QPen(QColor(palette.GREEN if dot < n else palette.BORDER_STRONG), 1.5))
-                painter.setBrush(QColor(palette.GREEN) if dot < n else Qt.BrushStyle.NoBrush)
-                painter.drawEllipse(box)
+        for start, end, left, name_w in self.COLUMNS:
+            for k, row in enumerate(self._rows[start:end]):
+                self._paint_row(painter, row, left, name_w, k * self.ROW_H)
+
+    def _paint_row(
+        self, painter: QPainter, row: tuple[str, int, int], left: int, name_w: int, y: int
+    ) -> None:
+        name, n, wanted = row
+        painter.setPen(QColor(palette.SECONDARY if n >= wanted else palette.TEXT))
+        painter.drawText(QRectF(left, y, name_w, self.ROW_H), Qt.AlignmentFlag.AlignVCenter, name)
+        for dot in range(wanted):
+            x = left + name_w + dot * (self.DOT + self.GAP)
+            painter.setPen(QPen(QColor(palette.GREEN if dot < n else palette.BORDER_STRONG), 1.5))
+            painter.setBrush(QColor(palette.GREEN) if dot < n else Qt.BrushStyle.NoBrush)
+            painter.drawEllipse(QRectF(x, y + (self.ROW_H - self.DOT) / 2, self.DOT, self.DOT))
 
 
 _WANTED = (
@@ -198,10 +217,10 @@ _WANTED = (
     ("Middle", 3),
     ("Far", 3),
     ("Square", 2),
-    ("Left side near", 3),
-    ("Right side near", 3),
-    ("Top near", 3),
-    ("Bottom near", 3),
+    ("Left nearer", 3),
+    ("Right nearer", 3),
+    ("Top nearer", 3),
+    ("Bottom nearer", 3),
 )
 _TILTS = ("square", "left", "right", "up", "down")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout
 
-from app.theme import icon_pixmap, palette
+from app.theme import icon_pixmap, palette, style_class
 from app.widgets.tables import Column, RowTable
 from app.windows.calibration.parts import Page, button, card, label
 from app.windows.calibration.pictures import ResidualPicture
@@ -86,8 +86,12 @@ class ResultPage(Page):
             left.addWidget(part)
         pictures = QHBoxLayout()
         pictures.setSpacing(16)
-        self.depth_picture = ResidualPicture("result_depth_residuals", "Corners, infrared")
-        self.color_picture = ResidualPicture("result_color_residuals", "Corners, colour")
+        self.depth_picture = ResidualPicture(
+            "result_depth_residuals", "Infrared: corners against the calibration"
+        )
+        self.color_picture = ResidualPicture(
+            "result_color_residuals", "Colour: corners against the calibration"
+        )
         pictures.addWidget(self.depth_picture, 1)
         pictures.addWidget(self.color_picture, 1)
         left.addLayout(pictures, 1)
@@ -123,7 +127,8 @@ class ResultPage(Page):
         counted = f"{profile.views} views"
         self.views.setText(counted if not left_out else f"{counted}, {left_out} left out")
         for key, value, meaning in figures(verdict):
-            self.figures[key][0].setText(value if value == "not known" else f"{value}")
+            self.figures[key][0].setText(value)
+            self.figures[key][0].setEnabled(verdict.grade != "refused")  # grey: not to be relied on
             self.figures[key][1].setText(meaning)
         notes = [*verdict.reasons, *(n for n in profile.notes if n not in verdict.reasons)]
         self.reasons_title.setText(
@@ -146,6 +151,7 @@ class ResultPage(Page):
         self.go_on_button.setVisible(True)
         self.done_button.hide()
         self.saved.hide()
+        style_class(self.go_on_button, "primary" if refused else "secondary")
         self.primary = self.go_on_button if refused else self.save_button
 
     def show_saved(self, profile: CalibrationProfile) -> None:

@@ -31,8 +31,11 @@ _INTRINSICS = (
 _DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 
 
-def _number(value: float, digits: int, unit: str) -> str:
-    return "not known" if not math.isfinite(value) else f"{value:.{digits}f} {unit}".rstrip()
+def _figure(value: float, digits: int, unit: str) -> str:
+    if not math.isfinite(value):
+        return "not known"
+    least = 10.0**-digits
+    return f"under {least:g} {unit}" if value < 0.5 * least else f"{value:.{digits}f} {unit}"
 
 
 def _sigma(value: float | None, digits: int, unit: str, factor: float = 1.0) -> str:
@@ -45,9 +48,9 @@ def _sigma(value: float | None, digits: int, unit: str, factor: float = 1.0) -> 
 def parameter_rows(profile: CalibrationProfile) -> list[Row]:
     """Every parameter with its 95 % uncertainty."""
     rig, sigma = profile.rig, profile.sigma
-    rows = _camera_rows("depth", "Depth camera", rig.depth, sigma)
+    rows = _camera_rows("depth", "Depth", rig.depth, sigma)
     if rig.color is not None and rig.color_from_depth is not None:
-        rows += _camera_rows("color", "Colour camera", rig.color, sigma)
+        rows += _camera_rows("color", "Colour", rig.color, sigma)
         turn = math.degrees(
             math.acos(float(np.clip((np.trace(rig.color_from_depth.rotation) - 1) / 2, -1.0, 1.0)))
         )
@@ -98,8 +101,8 @@ def _camera_rows(name: str, title: str, camera: PinholeCamera, sigma: Mapping[st
                 _row(
                     f"{name}.{key}",
                     f"{title}: distortion {key}",
-                    f"{value:.4f}",
-                    _sigma(sigma.get(f"{name}.{key}"), 4, ""),
+                    f"{value:.5f}",
+                    _sigma(sigma.get(f"{name}.{key}"), 5, ""),
                 )
             )
     return rows
@@ -112,9 +115,13 @@ def _row(key: str, name: str, value: str, bound: str) -> Row:
 def figures(verdict: Verdict) -> list[tuple[str, str, str]]:
     """Key, value and what it means, of the three figures people can use."""
     return [
-        ("picture", _number(verdict.picture_mm, 1, "mm"), "picture against depth, on the skin at 2.3 m"),
-        ("depth", _number(verdict.depth_mm, 0, "mm"), "error of the distance to the patient"),
-        ("length", _number(verdict.length_percent, 2, "%"), "error of lengths on the body"),
+        (
+            "picture",
+            _figure(verdict.picture_mm, 1, "mm"),
+            "picture against depth at 2.3 m (95 %)",
+        ),
+        ("depth", _figure(verdict.depth_mm, 0, "mm"), "error of the distance to the patient (95 %)"),
+        ("length", _figure(verdict.length_percent, 2, "%"), "error of lengths on the body (95 %)"),
     ]
 
 

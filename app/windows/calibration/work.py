@@ -188,10 +188,10 @@ def _pose(view: BoardView | None, session: CalibrationSession) -> tuple[str, flo
 
 _TILTS = {
     "square": "square",
-    "left": "left side near",
-    "right": "right side near",
-    "up": "top near",
-    "down": "bottom near",
+    "left": "left nearer",
+    "right": "right nearer",
+    "up": "top nearer",
+    "down": "bottom nearer",
 }
 
 
