@@ -67,7 +67,7 @@ def run(
     profiles: Path | None = _PROFILES,
     as_json: bool = _JSON,
 ) -> None:
-    """Collect views of the board, calibrate, judge, and keep the profile. A refused set of views exits with 3."""
+    """Collect views of the board, calibrate, judge, keep the profile. A refused set of views exits with 3."""
     store = _store(profiles)
     if Path(source).is_dir():
         session = _folder_session(Path(source), square_mm, views)
@@ -92,7 +92,7 @@ def check(
     profiles: Path | None = _PROFILES,
     as_json: bool = _JSON,
 ) -> None:
-    """See whether a rig still stands as calibrated: hold up the board for ten seconds. Exits with 3 if not."""
+    """See whether a rig still stands as calibrated: hold up the board for ten seconds. Exit 3 if not."""
     store = _store(profiles)
     if Path(source).is_dir():
         from core.calibration.daily_check import check_rig
@@ -135,7 +135,8 @@ def list_profiles(profiles: Path | None = _PROFILES, as_json: bool = _JSON) -> N
             else f"{p.depth_serial} + {p.color_serial}"
         )
         typer.echo(
-            f"{p.id}  {p.made_at:%Y-%m-%d %H:%M}  version {p.version}  {p.views} views  {serials}  {mark}".rstrip()
+            f"{p.id}  {p.made_at:%Y-%m-%d %H:%M}  version {p.version}  {p.views} views  "
+            f"{serials}  {mark}".rstrip()
         )
     for path in store.damaged():
         typer.echo(f"{path.name}: not readable as a calibration profile", err=True)
@@ -338,8 +339,8 @@ def result_report(result: CalibrationResult) -> dict[str, Any]:
 def check_report(result: CheckResult) -> dict[str, Any]:
     """What ``calibrate check --json`` prints."""
     names = (
-        "shift_px", "limit_px", "rotation_deg", "rotation_sigma_deg", "translation_mm", "translation_sigma_mm",
-        "depth_error_mm", "depth_limit_mm",
+        "shift_px", "limit_px", "rotation_deg", "rotation_sigma_deg", "translation_mm",
+        "translation_sigma_mm", "depth_error_mm", "depth_limit_mm",
     )  # fmt: skip
     figures = {name: _number(getattr(result, name)) for name in names}
     return {"verdict": result.verdict, "message": result.message, "views": result.views, **figures}

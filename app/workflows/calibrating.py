@@ -143,7 +143,7 @@ class CalibrationSession:
 
     @property
     def live_rms_px(self) -> dict[str, float]:
-        """Reprojection error of a quick calibration of each camera, ``depth`` and ``color``; empty at first."""
+        """Reprojection error of a quick calibration of each camera, ``depth`` and ``color``."""
         return dict(self._rms)
 
     def missing(self) -> list[str]:
@@ -221,7 +221,7 @@ class CalibrationSession:
     def _unfit(self, view: BoardView, still_s: float, name: str) -> str:
         """Why a picture of the board cannot be used; empty if it can."""
         if is_blurred(view):
-            return f"The {name} picture of the board is blurred: more light, hold it still, or a little farther away."
+            return f"The {name} picture is blurred: more light, hold still, or a little farther away."
         if still_s < 0:
             return "Hold the board still."
         if len(view) < 0.4 * self.spec.corner_count:

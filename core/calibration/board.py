@@ -176,7 +176,7 @@ class BoardView:
         return replace(self, ids=self.ids[keep], pixels=self.pixels[keep])
 
     def shift_px(self, other: BoardView) -> float:
-        """Median distance of common corners to another view, in pixels; inf with fewer than four in common."""
+        """Median distance of common corners to another view in pixels; inf with fewer than four."""
         _, mine, theirs = np.intersect1d(self.ids, other.ids, return_indices=True)
         if len(mine) < 4:
             return float("inf")

@@ -68,7 +68,7 @@ def board_pdf(paper: str = "A4", spec: BoardSpec | None = None) -> bytes:
 
 
 def black_rectangles(spec: BoardSpec) -> list[tuple[float, float, float, float]]:
-    """What is black: left, top, width and height in metres from the board's top left corner, none overlapping.
+    """What is black: left, top, width, height in metres from the board's top left corner, none overlapping.
 
     Runs of black modules in a row are joined, and equal runs of successive rows, so that no hairlines of
     paper show between them.
@@ -122,9 +122,12 @@ def _foot(canvas: Any, spec: BoardSpec, paper: str, left: float, bottom: float, 
     text.setLeading(line * m)
     for words in (
         "1. Print at 100 % (“actual size”), without “fit to page”, on matt paper.",
-        f"2. Measure the ruler. Then measure the whole row of {spec.squares_x} squares: {width:.1f} mm if the printer is exact.",
-        f"3. Enter one square as measured: that length divided by {spec.squares_x} ({1000 * spec.square_m:.2f} mm if exact).",
-        "4. Glue it flat on a stiff board (glass, aluminium composite, foam board). A bent board spoils the calibration.",
+        f"2. Measure the ruler. Then measure the whole row of {spec.squares_x} squares: "
+        f"{width:.1f} mm if the printer is exact.",
+        f"3. Enter one square as measured: that length divided by {spec.squares_x} "
+        f"({1000 * spec.square_m:.2f} mm if exact).",
+        "4. Glue it flat on a stiff board (glass, aluminium composite, foam board). "
+        "A bent board spoils the calibration.",
         "5. Keep a white margin around the squares; do not laminate: reflections hide corners.",
     ):
         text.textLine(words)

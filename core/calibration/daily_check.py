@@ -102,8 +102,8 @@ def check_rig(profile: CalibrationProfile, spec: BoardSpec, views: Sequence[RigV
     """Compare seen colour corners with those that the infrared corners and the profile predict.
 
     Each board pose comes from the infrared picture. A pose is uncertain mostly along the line of sight, and
-    that hardly moves the prediction, because the cameras stand side by side. What is left is explained by a turn
-    of the colour camera or by a shift of it, whichever needs less; the depth of the board is compared too.
+    that hardly moves the prediction, because the cameras stand side by side. What is left is explained by a
+    turn of the colour camera or by a shift of it, whichever needs less; the depth of the board is compared too.
 
     Parameters
     ----------
@@ -159,8 +159,8 @@ def _compared(
     if float(np.median(own)) > limit:
         return CheckResult(
             "moved",
-            "The infrared camera itself no longer sees the board as calibrated: its lens or the measured size of "
-            "the board has changed. Calibrate the rig again.",
+            "The infrared camera itself no longer sees the board as calibrated: its lens has changed, or "
+            "the measured size of the board. Calibrate the rig again.",
             len(usable), shift, limit,
         )  # fmt: skip
     jacobian, residual = np.concatenate(rows).reshape(-1, 6), np.concatenate(off).ravel()
@@ -186,7 +186,7 @@ def _compared(
         how = f"turned by about {turn:.1f} degrees" if by_turn else f"shifted by about {move:.0f} mm"
         verdict: CheckVerdict = "moved"
         message = (
-            f"The colour camera has moved: corners are {shift:.1f} pixels from their place, as if it were {how}. "
+            f"The colour camera has moved: corners are {shift:.1f} pixels off, as if it were {how}. "
             "Put it back, or calibrate the rig again before the next patient."
         )
     elif turn_sigma > WARN_DEG and move_sigma > WARN_MM:

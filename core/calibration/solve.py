@@ -68,8 +68,8 @@ class RigSolution:
     rig : CameraRig
     depth_correction : DepthCorrection
     names : tuple of str
-        Parameters of `covariance`: ``depth.fx`` ... ``color.k1``, ``relation.rx`` (radians) ... ``relation.tz``
-        (metres), ``correction.scale``, ``correction.offset``.
+        Parameters of `covariance`: ``depth.fx`` ... ``color.k1``, ``relation.rx`` (radians) ...
+        ``relation.tz`` (metres), ``correction.scale``, ``correction.offset``.
     covariance : ndarray (p, p)
     sigma : dict of str to float
         As a profile keeps it.
@@ -121,8 +121,8 @@ def solve_rig(
     Parameters
     ----------
     views : sequence of RigView
-        At least four with an infrared picture of the board; for a colour camera at least four with colour, and
-        three with both.
+        At least four with an infrared picture of the board; for a colour camera at least four with colour,
+        and three with both.
     spec : BoardSpec
         As measured.
     board_sigma : float
@@ -255,7 +255,7 @@ def _enough(views: Sequence[RigView], use: Sequence[int], has_color: bool) -> No
     if infrared < MIN_VIEWS or (has_color and both < 3):
         raise WorkError(
             "Too few views fit each other to calibrate the rig.",
-            "Hold the board still for each view and collect them again; check the measured size of the squares.",
+            "Hold the board still for each view and collect them again; check the measured size.",
         )
 
 

@@ -4,8 +4,8 @@
     infrared_000.png   8 or 16 bit grey     color_000.png   8-bit RGB     depth_000.png   16 bit
 
 views.json: {"format", "depth_serial", "color_serial", "model", "sensor", "board": {"squares_x", "squares_y",
-"square_m", "marker_m", "dictionary"}, "depth_unit_m", "views": [{"infrared", "color", "depth"}, ...]}; any of the
-three pictures of a view may be missing.
+"square_m", "marker_m", "dictionary"}, "depth_unit_m", "views": [{"infrared", "color", "depth"}, ...]}; any of
+the three pictures of a view may be missing.
 """
 
 from __future__ import annotations

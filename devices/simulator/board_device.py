@@ -240,7 +240,7 @@ class SimulatedBoardCamera:
         assert self._renderer is not None
         assert self._motion is not None
         t = (number - 1) / FRAMES_PER_S
-        # Where streams change in between, a view takes longer; without a real clock nobody needs time to look.
+        # Where streams change in between, a view takes longer; without a real clock nobody has to look.
         dwell, move = _QUICK_S if self._scene.free else (_DWELL_S, _MOVE_S)
         dwell *= 2.5 if self._scene.exclusive else 1.0
         pose = self._motion.at(t, dwell, move)
@@ -352,7 +352,7 @@ def _address(scene: BoardScene) -> str:
 
 
 class _BoardCameras:
-    """Factory for ``simulator-board:kinect``, with options as in ``simulator-board:kinect?seed=3&exclusive=1``.
+    """Factory for ``simulator-board:kinect``; options as in ``simulator-board:kinect?seed=3&exclusive=1``.
 
     Options: seed, paper, color (640x480), exclusive, moved_deg, moved_mm, free.
     """

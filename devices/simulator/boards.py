@@ -298,7 +298,7 @@ class _Eye:
         return np.asarray(tone)
 
     def grain(self, rng: np.random.Generator, channels: int) -> Image:
-        """Unit noise (h, w, channels): a random piece of a larger sheet, which is cheaper than fresh noise."""
+        """Unit noise (h, w, channels): a random piece of a larger sheet, cheaper than fresh noise."""
         h, w = self.camera.height, self.camera.width
         if self._sheet is None:
             self._sheet = rng.standard_normal(((h + 128) * (w + 128) * channels,), dtype=np.float32)

@@ -7,8 +7,8 @@ The board is exact: flat, and its size known; the error of measuring it comes on
 uncertainty (0.03 % unless told otherwise). Errors are absolute; "within 2 sigma" is the share of true errors
 that lie within twice the stated standard deviation, over all runs of all rigs, which should be near 95 %.
 
-Kinect: 640 x 480 infrared and colour, A3 board, 0.55 to 1.15 m away. Moving: the same views with the corners of
-each picture moved together by 0.2 pixels (RMS an axis), as by a hand that is not quite still between two
+Kinect: 640 x 480 infrared and colour, A3 board, 0.55 to 1.15 m away. Moving: the same views with the corners
+of each picture moved together by 0.2 pixels (RMS an axis), as by a hand that is not quite still between two
 exposures. Auxiliary: infrared 640 x 480 with a 1920 x 1440 colour camera mounted up to 1.5 degrees askew.
 """
 
@@ -133,7 +133,7 @@ def run(quick: bool = False) -> list[dict[str, Any]]:
             used.append(solution.used)
             for name, pairs in _errors(solution, board_rig).items():
                 found[name].append([abs(e) for e, _ in pairs])
-                # A turn is the length of three errors: its bound is that of three, 2.8 sigma / sqrt(3) an axis.
+                # A turn is the length of three errors: 95 % lie within 2.8 sigma of one axis.
                 factor = 2.795 / np.sqrt(3) if name.startswith("rotation") else 2.0
                 inside[name] += [abs(e) / (factor * s) for e, s in pairs]
             print(

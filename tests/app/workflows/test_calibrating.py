@@ -20,8 +20,11 @@ from devices.simulator.boards import BoardRenderer, BoardRig, good_poses
 from tests.core.calibration.boards_before import SPEC, usual_views
 
 
+ALL = ("depth", "color", "infrared")
+
+
 def frames_of(
-    board_rig: BoardRig, poses: Sequence[RigidTransform], streams: Sequence[str] = ("depth", "color", "infrared"),
+    board_rig: BoardRig, poses: Sequence[RigidTransform], streams: Sequence[str] = ALL,
     each: int = 5, start: int = 0,
 ) -> list[LiveFrame]:  # fmt: skip
     """A board that is held still at one pose after the other, seen twelve times a second."""
