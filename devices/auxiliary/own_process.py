@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import signal
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from multiprocessing.shared_memory import SharedMemory
@@ -35,6 +37,24 @@ class _Notice:
     stamp: int
     places: list[Placed]
     facts: Mapping[str, Any]
+
+
+@contextlib.contextmanager
+def _deaf_to_interrupt() -> Iterator[None]:
+    """What is started inside never hears Ctrl-C; we hear one that comes meanwhile afterwards.
+
+    The process would otherwise die with a traceback while it starts, before it can say that it does not care.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # Starting this helper for the first time unblocks the signal again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class CameraProcess:
@@ -104,7 +124,8 @@ class CameraProcess:
         process = context.Process(
             target=serve, args=(there, self._source), name="geoderm-camera", daemon=True
         )
-        process.start()
+        with _deaf_to_interrupt():
+            process.start()
         there.close()
         self._process, self._pipe = process, here
         self._reader = threading.Thread(target=self._listen, name="geoderm-camera-reader", daemon=True)

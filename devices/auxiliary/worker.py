@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from collections import deque
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
@@ -32,6 +33,9 @@ def serve(pipe: Connection, source: CameraSource) -> None:
     """
     # Ctrl-C reaches the whole group; the application decides what is to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Shared memory is the application's. Opened here it would be noted a second time (Python 3.13 has
+    # track=False), and be called leaked if the application clears it away at that very moment.
+    resource_tracker.register = lambda name, rtype: None
     worker = _Worker(pipe, source)
     with contextlib.suppress(EOFError, OSError, _ApplicationGone):
         worker.work()
