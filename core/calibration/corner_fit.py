@@ -1,8 +1,8 @@
 """Corners of the board to a few hundredths of a pixel: the known print is fitted to the picture.
 
 Around every corner the picture is looked at in board coordinates and compared with the print, blurred as
-the lens blurs it (Lucas and Kanade's registration, with gain and offset of the light). A search for the saddle
-point alone is disturbed by the markers beside the corner; here they help.
+the lens blurs it (Lucas and Kanade's registration, with gain and offset of the light). A search for the
+saddle point alone is disturbed by the markers beside the corner; here they help.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def check_rig(profile: CalibrationProfile, spec: BoardSpec, views: Sequence[RigV
 
     Each board pose comes from the infrared picture. A pose is uncertain mostly along the line of sight, and
     that hardly moves the prediction, because the cameras stand side by side. What is left is explained by a
-    turn of the colour camera or by a shift of it, whichever needs less; the depth of the board is compared too.
+    turn of the colour camera or by a shift of it, whichever needs less; the board's depth is compared too.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ def _lens(
     """One camera from the kept views; those far worse than the others are dropped (one at a time)."""
     what = "infrared" if kind == "infrared" else "colour"
     while True:
-        numbers = [int(k) for k in np.flatnonzero(kept) if getattr(views[k], kind) is not None]
+        numbers = [k for k in map(int, np.flatnonzero(kept)) if getattr(views[k], kind) is not None]
         if len(numbers) < MIN_VIEWS:
             raise WorkError(
                 f"Only {len(numbers)} {what} views show the board.",

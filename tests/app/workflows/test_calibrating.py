@@ -19,7 +19,6 @@ from devices.simulator.board_device import BoardScene, SimulatedBoardCamera
 from devices.simulator.boards import BoardRenderer, BoardRig, good_poses
 from tests.core.calibration.boards_before import SPEC, usual_views
 
-
 ALL = ("depth", "color", "infrared")
 
 

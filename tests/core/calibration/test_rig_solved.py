@@ -77,6 +77,18 @@ def test_noisier_corners_are_stated_as_less_certain(usual) -> None:
     assert noisy.rms_px["stereo"] > 3 * solution.rms_px["stereo"]
 
 
+def test_errors_that_a_whole_picture_shares_are_seen_in_the_stated_uncertainty(usual) -> None:
+    """A hand that is not quite still moves all corners of a picture alike: averaging over corners is no help."""
+    board_rig, views, solution = usual
+    rng = np.random.default_rng(3)
+    unsteady = [
+        replace(v, color=replace(v.color, pixels=v.color.pixels + rng.normal(0, 0.3, 2))) for v in views
+    ]
+    again = solve_rig(unsteady, SPEC)
+    assert again.sigma["rotation_deg"] > 4 * solution.sigma["rotation_deg"]
+    assert turn_deg(again.rig, board_rig.rig) < 3 * again.sigma["rotation_deg"]
+
+
 def test_a_view_in_which_the_board_moved_between_the_cameras_is_left_out(usual) -> None:
     board_rig, views, solution = usual
     moved = replace(
