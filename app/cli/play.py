@@ -28,7 +28,7 @@ def play(
 ) -> None:
     """Show the frames of a recording: time, depth coverage, distance, colour, rate."""
     from core.errors import InputError, WorkError
-    from devices.openni.sources import open_source
+    from devices.recordings.sources import open_source
 
     if out is not None and out.exists():
         raise InputError(f"{out}: exists already.", "Choose another name.")
@@ -139,7 +139,7 @@ def _facts_json(facts: Any) -> dict[str, Any]:
 def _write_captures(source: Any, out: Path, frames: int, *, quiet: bool) -> None:
     import threading
 
-    from devices.openni.recorder import Limits, record
+    from devices.recordings.recorder import Limits, record
 
     report = record(source, out, Limits(None, frames, threading.Event()), burst=min(frames, 30))
     if not quiet:

@@ -14,7 +14,7 @@ import typer
 
 if TYPE_CHECKING:
     from devices.live import LiveCamera
-    from devices.openni.sources import FrameSource
+    from devices.recordings.sources import FrameSource
 
 
 def register(app: typer.Typer) -> None:
@@ -35,8 +35,8 @@ def record(
     from app.paths import calibration_dir, default_data_dir
     from core.calibration.profile import ProfileStore
     from core.errors import InputError
-    from devices.openni.recorder import Limits
-    from devices.openni.recorder import record as record_frames
+    from devices.recordings.recorder import Limits
+    from devices.recordings.recorder import record as record_frames
 
     if out.exists():
         raise InputError(f"{out}: exists already.", "Choose another name.")
@@ -62,7 +62,7 @@ def record(
 def _opened(device: str, store: Any) -> Iterator[LiveCamera | FrameSource]:
     from core.errors import InputError
     from devices.live import LiveCamera
-    from devices.openni.sources import open_source
+    from devices.recordings.sources import open_source
     from devices.registry import open_device
 
     kind, _, address = device.partition(":")

@@ -1,12 +1,11 @@
-"""The OpenNI2 cameras and recordings that the registry knows."""
+"""The OpenNI2 cameras that the registry knows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from core.errors import WorkError
-from devices.camera import DepthCamera, DeviceInfo
+from devices.camera import DeviceInfo
 from devices.openni.live import OpenNICamera
 from devices.openni.process import RuntimeProcess
 from devices.openni.recording import MAX_STREAM_WIDTH, OniRecording, write_oni
@@ -14,15 +13,11 @@ from devices.openni.recording import MAX_STREAM_WIDTH, OniRecording, write_oni
 __all__ = [
     "CONNECTED_CAMERAS",
     "MAX_STREAM_WIDTH",
-    "RECORDINGS",
     "OniRecording",
     "OpenNICamera",
     "find_cameras",
     "write_oni",
 ]
-
-LIVE_SUFFIX = "?live"
-"""After the path of a recording: play it in real time, again and again, as a live camera."""
 
 _LIST_TIMEOUT_S = 8.0
 
@@ -58,21 +53,4 @@ class _ConnectedCameras:
         return OpenNICamera(address)
 
 
-class _Recordings:
-    """Factory of recordings: any file, or folder of captures, that a person names."""
-
-    def devices(self) -> Sequence[DeviceInfo]:
-        """None by themselves."""
-        return []
-
-    def create(self, address: str) -> DepthCamera:
-        """Recording at a path; with ``?live`` behind it, a live camera that plays it in real time."""
-        if not address.endswith(LIVE_SUFFIX) or Path(address).exists():
-            return OniRecording(Path(address))
-        from devices.openni.played import PlayedCamera
-
-        return PlayedCamera(Path(address.removesuffix(LIVE_SUFFIX)))
-
-
 CONNECTED_CAMERAS = _ConnectedCameras()
-RECORDINGS = _Recordings()

@@ -22,7 +22,7 @@ from unittest import mock
 from devices.openni import recording
 from devices.openni.cameras import OpenNICamera
 from devices.openni.oni_layout import inspect_oni
-from devices.openni.recorder import Limits, record
+from devices.recordings.recorder import Limits, record
 from tests.devices.openni.oni_mutations import LONGEST_S, MUTATIONS, Outcome, mutate, play, write_original
 from tests.devices.openni_driver.feed import build_redist, make_feed
 

@@ -21,9 +21,9 @@ from devices.openni.cameras import OniRecording, OpenNICamera
 from devices.openni.oni_file import OniWriter
 from devices.openni.oni_layout import inspect_oni
 from devices.openni.oni_mend import mend_oni
-from devices.openni.played import PlayedCamera
-from devices.openni.recorder import Limits, record
-from devices.openni.sources import open_source
+from devices.recordings.played import PlayedCamera
+from devices.recordings.recorder import Limits, record
+from devices.recordings.sources import open_source
 from tests.devices.openni_driver.feed import FeedFolder, wait_until
 
 Feeds = Callable[..., FeedFolder]

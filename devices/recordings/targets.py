@@ -18,7 +18,7 @@ from devices.live import LiveFrame
 from devices.openni.calibration import write_calibration
 from devices.openni.oni_file import ColorCodec, OniWriter
 from devices.openni.recording import reduced
-from devices.openni.sources import write_sequence
+from devices.recordings.sources import write_sequence
 
 _FINE_UNIT_M = 0.0001
 

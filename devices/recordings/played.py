@@ -33,7 +33,7 @@ from devices.live import (
     StreamKind,
     StreamMode,
 )
-from devices.openni.sources import NOMINAL_PERIOD_S, FrameSource, SourceFacts, open_source
+from devices.recordings.sources import NOMINAL_PERIOD_S, FrameSource, SourceFacts, open_source
 
 LONGEST_GAP_S = 1.0
 """A pause of the recording (between two bursts) is played no longer than this."""

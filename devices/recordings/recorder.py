@@ -19,14 +19,14 @@ from devices.openni.calibration import NOMINAL_WARNING, calibration_path, write_
 from devices.openni.live import OpenNICamera
 from devices.openni.oni_layout import inspect_oni
 from devices.openni.oni_mend import mend_oni
-from devices.openni.record_targets import (
+from devices.recordings.sources import FrameSource
+from devices.recordings.targets import (
     FolderTarget,
     OniTarget,
     RecordedRig,
     RecordingTarget,
     unwritable,
 )
-from devices.openni.sources import FrameSource
 
 MAX_WAITING = 60
 """Frames that may wait for the disk; a newer one is left out then, and counted."""
