@@ -78,7 +78,7 @@ def test_noisier_corners_are_stated_as_less_certain(usual) -> None:
 
 
 def test_errors_that_a_whole_picture_shares_are_seen_in_the_stated_uncertainty(usual) -> None:
-    """A hand that is not quite still moves all corners of a picture alike: averaging over corners is no help."""
+    """A hand that is not quite still moves all corners of a picture alike: their number does not help."""
     board_rig, views, solution = usual
     rng = np.random.default_rng(3)
     unsteady = [
