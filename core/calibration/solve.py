@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.calibration.board import BoardSpec
-from core.calibration.bundle import Adjusted, Bundle, Noise, adjust, plane_at
+from core.calibration.bundle import Adjusted, Bundle, Noise, adjust
 from core.calibration.depth_plane import PlaneDepth, plane_depth
 from core.calibration.lens import MIN_VIEWS, LensFit, fit_lens, guarded
 from core.calibration.profile import DepthCorrection
@@ -399,6 +399,3 @@ def _sigmas(names: Sequence[str], covariance: FloatArray) -> dict[str, float]:
         if f"correction.{parameter}" in each:
             out[name] = float(each[f"correction.{parameter}"])
     return out
-
-
-__all__ = ["BOARD_SIGMA", "RigSolution", "ViewResidual", "plane_at", "solve_rig"]
