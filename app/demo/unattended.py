@@ -19,6 +19,7 @@ from app.demo.places import site_in_words
 from app.demo.scene import DemoCameras
 from app.gui import application, open_clinic, open_window
 from app.logs import log_path, start_logging
+from app.workflows.table import State
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QComboBox
@@ -203,23 +204,41 @@ class Tour:
         page = self._page
         self.hands.wait_until(lambda: page.captures.deck.camera is not None, "the camera to open", 60)
         self._choose_stance("stance_stance", stance)
-        self.hands.wait_until(lambda: page.captures.stance.live_view.image_size[0] > 0, "the live picture", 60)
+        self.hands.wait_until(
+            lambda: page.captures.stance.live_view.image_size[0] > 0, "the live picture", 60
+        )
         self.hands.settle(0.5)
         self.hands.shoot("stance_live")
-        self.hands.click("stance_primary")
-        self._idle("the stance capture")
+        self._take("stance_primary", State.STANCE_DONE)
         self.hands.shoot("stance")
-        if page.session.stance_candidate is not None:
-            self.hands.click("stance_secondary")
-            self._idle("the stance to be stored")
         self.hands.click("stance_primary")
         self._choose_stance("capture_stance", working)
-        self.hands.settle(0.8)
-        self.hands.click("capture_primary")
-        self._idle("the body capture")
+        self._take("capture_primary", State.CAPTURE_DONE)
         self.hands.shoot("capture")
         self.hands.click("capture_primary")
         self._idle("the lesions step")
+
+    def _take(self, button: str, done: State) -> None:
+        """Place the patient, count down, capture; a capture with doubts is used as it is."""
+        page = self._page
+        live = page.captures.deck.live
+        self.hands.wait_until(lambda: live.guidance is not None, "the readings", 60)
+        camera = page.captures.deck.camera
+        self.hands.wait_until(lambda: not camera.changing, "the patient to stand", 60)
+        self.hands.settle(2.0)
+        self.hands.shoot(f"{button.partition('_')[0]}_assistant")
+        self.hands.click(button)
+        self.hands.settle(0.3)
+        self.hands.shoot("countdown")
+        self.hands.wait_until(lambda: not page.captures.assist.busy, "the capture", WORK_TIMEOUT_S)
+        self._idle("the capture")
+        if page.session.state is State.STANCE_CHECK:
+            self.hands.click("stance_secondary")
+            self._idle("the stance to be stored")
+        elif page.session.state is not done:
+            self.hands.click(button)
+            self._idle("the capture to be stored")
+        self.hands.wait_until(lambda: page.session.state is done, "the stored capture")
 
     def _choose_stance(self, name: str, stance: str) -> None:
         from PySide6.QtWidgets import QComboBox

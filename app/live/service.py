@@ -208,7 +208,7 @@ class LiveService(QObject):
                 else:
                     self._stream(source, source.live)
             except GeodermError as error:
-                self._emit_status(source, LiveStatus("gone", error.message, _gone_advice(error.advice)))
+                self._emit_status(source, LiveStatus("gone", error.message, _GONE_ADVICE))
                 self._reopen(source)
             except Exception as error:  # noqa: BLE001 - the border of the thread: nothing may get lost here
                 self.failed.emit(describe_failure(error))
@@ -371,13 +371,12 @@ class LiveService(QObject):
                 self._gate.wait_for(lambda: self._closed, spare)
 
 
+_GONE_ADVICE: Final = (
+    "Check its cable and power. It is opened again by itself as soon as it is back. "
+    "Nothing of the visit is lost."
+)
 _STALLED = LiveStatus(
     "stalled",
     "The camera has stopped delivering pictures.",
     "Check its cable; it is started again by itself. Nothing of the visit is lost.",
 )
-
-
-def _gone_advice(advice: str) -> str:
-    said = advice or "Check its cable and power."
-    return f"{said} It is opened again by itself as soon as it is back. Nothing of the visit is lost."

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QSlider
 
@@ -260,6 +260,27 @@ def test_a_capture_that_is_useless_is_refused_with_its_reason(
     assert "too dark" in desk.screen.verdict.text()
     assert desk.find("stance_primary").text() == "Capture again"  # type: ignore[attr-defined]
     assert desk.page.session.is_empty
+
+    joints = desk.screen.joints
+    desk.click("stance_correct")
+    assert not desk.screen.panel.primary.isEnabled(), "first the correction, then the verdict"
+    photo, before = desk.screen.photo, joints.skeleton
+    start = joints.joint_position("left_hand").toPoint()
+    QTest.mousePress(photo.viewport(), Qt.MouseButton.LeftButton, pos=start)
+    for step in (4, 8, 10):
+        QTest.mouseMove(photo.viewport(), start + QPoint(0, step))
+    QTest.mouseRelease(photo.viewport(), Qt.MouseButton.LeftButton, pos=start + QPoint(0, 10))
+    assert joints.skeleton is not before
+    moved = joints.skeleton.joints["left_hand"].pixel
+    desk.click("stance_correct")
+    desk.idle()
+    assert "cannot be used" in desk.screen.verdict.text(), "it is judged anew, and still dark"
+    judged = desk.page.captures._pending
+    assert judged is not None
+    hand = judged.new.analysed.skeleton.joints["left_hand"]
+    assert hand.source == "hand"
+    assert np.hypot(*(hand.pixel - moved)) < 2.0
+
     desk.from_folder(world.root / "psi", "stance_primary")
     assert desk.state is State.STANCE_DONE
 

@@ -158,8 +158,8 @@ class CameraDeck(QObject):
 
     def _release(self) -> None:
         """Let go of the camera; it is closed in the background."""
-        self.live.set_camera(None)
         camera, self._camera, self._wanted, self._calibration = self._camera, None, "", ""
+        self.live.set_camera(None)
         if camera is not None:
             self._context.tasks.start(
                 "Closing the camera", lambda progress: camera.close(), quiet=True, cancellable=False

@@ -26,6 +26,7 @@ from app.widgets.live_strip import ReadingStrip
 from app.widgets.live_view import LiveView
 from app.widgets.photo_view import PhotoView
 from app.windows.visit.camera_deck import CameraDeck
+from app.windows.visit.joint_editor import JointEditor
 from app.windows.visit.live_controls import AssistControls
 from app.windows.visit.live_verdict import VerdictPanel
 from app.windows.visit.pictures import joints_picture
@@ -95,6 +96,8 @@ class CaptureScreen(QWidget):
         self.strip = ReadingStrip(name)
         self.controls = AssistControls(name)
         self.verdict = VerdictPanel(name)
+        self.joints = JointEditor(self.photo, name)
+        self.joints.hide()
         self.caption = QLabel()
         self.caption.setObjectName(f"{name}_photo_caption")
         style_class(self.caption, "caption")
@@ -169,6 +172,7 @@ class CaptureScreen(QWidget):
         left.setSpacing(8)
         left.addWidget(frame, 1)
         left.addWidget(self.strip)
+        left.addWidget(self.joints)
         below = QHBoxLayout()
         below.addWidget(self.caption, 1)
         below.addWidget(self.live_button)
@@ -268,6 +272,8 @@ class CaptureScreen(QWidget):
         """Show what the camera sees."""
         self._live = True
         self._pictures.setCurrentWidget(self.live_view)
+        self.joints.set_capture(None)
+        self.joints.hide()
         self._on_camera()
 
     def _show_photo(self) -> None:
@@ -275,12 +281,21 @@ class CaptureScreen(QWidget):
         self._pictures.setCurrentWidget(self.photo)
         self.strip.hide()
         self.controls.hide()
+        self.joints.hide()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102
         if event.key() == Qt.Key.Key_Escape:
             self.escaped.emit()
         else:
             super().keyPressEvent(event)
+
+    def show_unsaved(self, analysed: AnalysedCapture, picture: QImage, caption: str) -> None:
+        """Show a capture that is not stored yet; its joints can be corrected by hand."""
+        self._show_photo()
+        self.joints.set_capture(analysed)
+        self.joints.show()
+        self.photo.set_image(picture)
+        self.caption.setText(caption)
 
     def show_capture(self, analysed: AnalysedCapture | None, caption: str) -> None:
         """Show a capture with its joints instead of the camera's picture."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Slot
 
@@ -14,43 +13,22 @@ from app.windows.visit.camera_deck import CameraDeck
 from app.windows.visit.capture_screen import CaptureScreen
 from app.windows.visit.host import VisitHost
 from app.windows.visit.live_assist import LiveAssist
-from app.windows.visit.live_ghost import ghost_name, ghost_outlines, ghost_record
+from app.windows.visit.live_capture import Judged, capture_and_judge, correct_and_judge
+from app.windows.visit.live_ghost import GhostLayer
 from app.windows.visit.live_verdict import verdict_picture
-from app.windows.visit.pictures import stored_picture
-from app.workflows.analysis import NewCapture, Role, take
+from app.windows.visit.pictures import joints_picture, stored_picture
+from app.workflows.analysis import NewCapture, Role
 from app.workflows.search import SearchOutcome
 from app.workflows.table import Event, State
 from app.workflows.wording import when
-from core.progress import Progress, ScaledProgress
+from core.progress import Progress
 
 if TYPE_CHECKING:
-    from core.guidance import CaptureQuality
+    from core.anchors import Skeleton
     from core.records import CaptureRecord
 
 _STANCE_STATES = (State.STANCE, State.STANCE_CHECK, State.STANCE_DONE)
 _CANCEL = "Cancel (Esc)"
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """A new capture and its verdict.
-
-    Attributes
-    ----------
-    new : NewCapture
-    quality : CaptureQuality
-    stored : int or None
-        Id of the capture if it was good enough to be stored at once.
-    """
-
-    new: NewCapture
-    quality: CaptureQuality
-    stored: int | None
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The verdict's sentences, then what the skeleton has to say."""
-        return tuple(dict.fromkeys((*self.quality.sentences, *self.new.analysed.skeleton.warnings)))
 
 
 class CaptureSteps(QObject):
@@ -68,7 +46,8 @@ class CaptureSteps(QObject):
         self._pending: Judged | None = None
         self._latest: Judged | None = None
         self._notes: dict[int, Judged] = {}
-        self._ghost_key: tuple[object, ...] | None = None
+        self._corrected: Skeleton | None = None
+        self._ghost = GhostLayer(host, self.deck, self)
         self._warned = False
         self.stance.set_stance("psi")
         self.stance.set_choices_visible(view=False)
@@ -77,7 +56,9 @@ class CaptureSteps(QObject):
             screen.live_toggled.connect(self.refresh)
             screen.escaped.connect(self._on_escape)
             screen.controls.automatic_toggled.connect(self._on_automatic)
-            screen.controls.ghost_changed.connect(self._on_ghost)
+            screen.controls.ghost_changed.connect(self._ghost.show_opacity)
+            screen.joints.corrected.connect(self._on_joints)
+            screen.joints.editing_changed.connect(self._on_editing)
         self.stance.primary_clicked.connect(self._stance_primary)
         self.stance.secondary_clicked.connect(self._stance_secondary)
         self.capture.primary_clicked.connect(self._capture_primary)
@@ -96,7 +77,8 @@ class CaptureSteps(QObject):
         screen = self.stance if state in _STANCE_STATES else self.capture
         if screen is not self._current:
             self._current = screen
-            self._shown = self._pending = self._ghost_key = None
+            self._shown = self._pending = None
+            self._ghost.forget()
             screen.refresh_cameras()
             if not self.deck.camera_id:
                 self._choose_default()
@@ -126,6 +108,9 @@ class CaptureSteps(QObject):
             screen.panel.primary.setEnabled(True)
             screen.secondary.setVisible(False)
             screen.live_view.setFocus()
+        elif screen.joints.editing:
+            screen.panel.primary.setEnabled(False)
+            screen.secondary.setEnabled(False)
 
     def _show_stance(self) -> None:
         session, screen = self._host.session, self.stance
@@ -183,8 +168,10 @@ class CaptureSteps(QObject):
         screen.verdict.show_quality(judged.quality, judged.sentences)
 
         def show() -> None:
-            screen.show_plain(
-                verdict_picture(judged.new.analysed, judged.quality), "The capture. It is not saved yet."
+            screen.show_unsaved(
+                judged.new.analysed,
+                verdict_picture(judged.new.analysed, judged.quality),
+                "The capture. It is not saved yet.",
             )
 
         self._show_once(screen, ("judged", id(judged)), show)
@@ -199,7 +186,7 @@ class CaptureSteps(QObject):
     def _look(self, screen: CaptureScreen) -> None:
         screen.show_preview()
         self.assist.attach(screen, psi=screen is self.stance)
-        self._lay_ghost(screen)
+        self._ghost.lay(screen, "psi" if screen is self.stance else "working")
 
     def _show_record(self, screen: CaptureScreen, record: CaptureRecord) -> None:
         session = self._host.session
@@ -234,45 +221,41 @@ class CaptureSteps(QObject):
             self._shown = (screen, *key)
             show()
 
-    # --- the outline of an earlier view --------------------------------------------------------------
+    # --- joints placed by hand -----------------------------------------------------------------------
 
-    def _lay_ghost(self, screen: CaptureScreen) -> None:
-        """Find the outline of an earlier view once for each view and camera."""
-        session, camera = self._host.session, self.deck.camera
-        if camera is None or not self.deck.is_live:
+    @Slot(object)
+    def _on_joints(self, skeleton: Skeleton) -> None:
+        self._corrected = skeleton
+
+    @Slot(bool)
+    def _on_editing(self, on: bool) -> None:
+        """When the correction is done, the capture is judged anew."""
+        screen = self._current
+        if screen is None or on:
+            self._corrected = None
+            self.refresh()
             return
-        role: Role = "psi" if screen is self.stance else "working"
-        view = "front" if screen is self.stance else screen.view
-        record = ghost_record(session.snapshot, role, view)
-        key = (screen, self.deck.camera_id, id(camera), None if record is None else record.id)
-        if key == self._ghost_key:
+        skeleton, self._corrected, self._shown = self._corrected, None, None
+        session = self._host.session
+        pending = self._pending
+        new = session.stance_candidate if pending is None else pending.new
+        if skeleton is None or new is None:
+            self.refresh()
             return
-        self._ghost_key = key
-        screen.live_view.set_ghost(None)
-        screen.controls.offer_ghost("" if record is None else ghost_name(session.snapshot, record))
-        if record is None:
-            return
-        capture_id, rig, store = record.id, camera.rig, session.store
-        task = self._host.context.tasks.start(
-            "Drawing the outline", lambda progress: ghost_outlines(store, capture_id, rig)
+        self._host.run(
+            "Placing the anchors",
+            lambda progress: correct_and_judge(new, skeleton, progress),
+            self._on_corrected,
+            stopped=self.refresh,
         )
 
-        def laid(outlines: Any) -> None:
-            if self._ghost_key == key:
-                screen.live_view.set_ghost(outlines)
-                self._on_ghost()
-
-        def missing(failure: TaskFailure) -> None:
-            if self._ghost_key == key:
-                screen.controls.offer_ghost("")
-
-        task.finished.connect(laid)
-        task.failed.connect(missing)
-
-    @Slot()
-    def _on_ghost(self) -> None:
-        for screen in (self.stance, self.capture):
-            screen.live_view.set_ghost_opacity(screen.controls.ghost_opacity)
+    def _on_corrected(self, judged: Judged) -> None:
+        self._latest = judged
+        if judged.new.good:
+            self._pending = judged
+        else:
+            self._host.session.stance_candidate = judged.new
+        self.refresh()
 
     # --- the camera ----------------------------------------------------------------------------------
 
@@ -311,6 +294,9 @@ class CaptureSteps(QObject):
             self._host.banner.show_error(status.message, status.advice)
         elif status.kind == "streaming" and self._warned:
             self._on_came_back()
+        elif self._warned and self.deck.camera is None:  # another one was chosen instead
+            self._warned = False
+            self._host.banner.clear()
         self.refresh()
 
     @Slot()
@@ -424,19 +410,16 @@ class CaptureSteps(QObject):
         strict = self.deck.is_live and self.deck.kind != "recording"
 
         def work(progress: Progress) -> Judged:
-            from core.guidance import judge_capture
-
-            capture = take(
-                camera, view=view, stance=stance, frames=frames, progress=ScaledProgress(progress, 0.0, 0.4)
+            return capture_and_judge(
+                camera,
+                session,
+                role,
+                view=view,
+                stance=stance,
+                frames=frames,
+                strict=strict,
+                progress=progress,
             )
-            new = session.analyse(capture, role, ScaledProgress(progress, 0.4, 0.85))
-            quality = judge_capture(new.analysed)
-            # a recording cannot be taken again: only what is useless is asked about
-            fine = quality.grade == "good" or (quality.grade == "usable" and not strict)
-            if not (fine and new.good):
-                return Judged(new, quality, None)
-            record = session.store_capture(new, ScaledProgress(progress, 0.85, 1.0))
-            return Judged(new, quality, record.id)
 
         title = "Capturing the stance" if role == "psi" else "Capturing the body"
         self._host.run(title, work, self._on_judged, stopped=self._on_stopped)
@@ -471,4 +454,8 @@ class CaptureSteps(QObject):
 
 def _show_new(screen: CaptureScreen, new: NewCapture) -> None:
     screen.verdict.show_quality(None)
-    screen.show_capture(new.analysed, "The capture with the joints found in it. It is not saved yet.")
+    screen.show_unsaved(
+        new.analysed,
+        joints_picture(new.analysed),
+        "The capture with the joints found in it. It is not saved yet.",
+    )
