@@ -332,7 +332,7 @@ def test_the_window_goes_on_while_the_board_is_looked_for(wizard: Wizard) -> Non
     wizard.to_collecting()
     wizard.collect(1)
     turns: list[float] = []
-    end = time.perf_counter() + 6.0
+    end = time.perf_counter() + 4.0
     last = time.thread_time()
     while time.perf_counter() < end:
         QApplication.processEvents()

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QVBoxLayout
 
-from app.theme import icon_pixmap, palette
+from app.theme import icon_pixmap, palette, style_class
 from app.widgets.status import MessageBanner
 from app.windows.calibration.collect_page import _column
 from app.windows.calibration.feed import Tick
@@ -93,6 +93,8 @@ class CheckPage(Page):
         for picture in (self.color, self.infrared):
             picture.clear()
         self.sign.setPixmap(icon_pixmap("target", 28, palette.ACCENT))
+        style_class(self.done_button, "primary")
+        self.primary = self.done_button
         self.headline.setText("Hold the board up before the cameras")
         self.text.setText(
             "Move it slowly across the picture and stop now and then; about a metre away."
@@ -128,9 +130,13 @@ class CheckPage(Page):
         self.numbers.setText(_numbers(result))
         self.bar.hide()
         self.again_button.show()
-        self.calibrate_button.setVisible(result.verdict == "moved")
+        moved = result.verdict == "moved"
+        self.calibrate_button.setVisible(moved)
         self.done_button.setEnabled(True)
-        self.done_button.setFocus(Qt.FocusReason.OtherFocusReason)
+        style_class(self.calibrate_button, "primary")
+        style_class(self.done_button, "secondary" if moved else "primary")
+        self.primary = self.calibrate_button if moved else self.done_button
+        self.primary.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def lost(self, message: str, advice: str) -> None:
         """The camera does not deliver any more."""

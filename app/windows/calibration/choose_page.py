@@ -43,9 +43,9 @@ class ChoosePage(Page):
         self.table = RowTable(
             [
                 Column("Camera"),
-                Column("Serial number", 250),
+                Column("Serial number", 230),
                 Column("Sensor", 150),
-                Column("Calibration", 290),
+                Column("Calibration", 370),
             ]
         )
         self.table.setObjectName("calibration_cameras")

@@ -16,7 +16,7 @@ from app.windows.calibration.wording import rms_in_words
 from app.windows.calibration.work import Findings
 from app.workflows.calibrating import Outcome
 
-_SIDE_W = 364
+_SIDE_W = 380
 _SIGNS = {
     Outcome.NOTHING: ("info", palette.SECONDARY),
     Outcome.REFUSED: ("move", palette.AMBER),
@@ -108,7 +108,7 @@ class CollectPage(Page):
         self.rms = label("", "caption", "collect_rms", wrap=True)
         column.addWidget(self.rms)
         frame, inner = card(margin=4)
-        self.views = RowTable([Column("#", 46), Column("Where"), Column("Tilt", 124), Column("m", 54)])
+        self.views = RowTable([Column("#", 54), Column("Where"), Column("Tilt", 128), Column("m", 54)])
         self.views.setObjectName("collect_views")
         self.views.setAccessibleName("Views taken")
         self.views.verticalHeader().setDefaultSectionSize(34)
@@ -180,7 +180,7 @@ class CollectPage(Page):
             if found.ready:
                 self.wish.setText("There is enough of everything: calibrate.")
             else:
-                self.wish.setText(f"{missing[0]}." if missing else "")
+                self.wish.setText(f"Also wanted: {_small(missing[0])}." if missing else "")
         self.rms.setText(f"Error of the corners: {rms_in_words(found.rms_px)}")
         self._gone = False
         self._refresh()
@@ -232,6 +232,10 @@ class CollectPage(Page):
             round(max(self.color.width(), self.infrared.width()) * ratio),
             round(max(self.color.height(), self.infrared.height()) * ratio),
         )
+
+
+def _small(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def _column(title: str, picture: BoardPicture, below: QWidget | None = None) -> QWidget:

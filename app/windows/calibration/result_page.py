@@ -128,7 +128,8 @@ class ResultPage(Page):
         self.views.setText(counted if not left_out else f"{counted}, {left_out} left out")
         for key, value, meaning in figures(verdict):
             self.figures[key][0].setText(value)
-            self.figures[key][0].setEnabled(verdict.grade != "refused")  # grey: not to be relied on
+            if verdict.grade == "refused":
+                meaning = f"{meaning}; not to be relied on"
             self.figures[key][1].setText(meaning)
         notes = [*verdict.reasons, *(n for n in profile.notes if n not in verdict.reasons)]
         self.reasons_title.setText(

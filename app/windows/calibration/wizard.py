@@ -292,6 +292,7 @@ class CalibrationWizard(Sheet):
             before = self.check.result
             self.check.show_tick(tick)
             if before is None and self.check.result is not None:
+                self._primary = self.check.primary
                 self._check_ended()
 
     @Slot(object)
@@ -343,9 +344,8 @@ class CalibrationWizard(Sheet):
 
     def _ask_to_drop(self, title: str, confirm: str, then: Callable[[], None]) -> None:
         views = self._unsaved_views
-        text = (
-            f"{views} view{'s' if views != 1 else ''} would be lost. No calibration has been saved from them."
-        )
+        what = "1 view has" if views == 1 else f"{views} views have"
+        text = f"{what} not become a saved calibration and would be lost."
         ask(self, title, text, confirm, then, danger=True)
 
     # --- solving ----------------------------------------------------------------------------------------
