@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,21 +90,10 @@ def _check_target(out: Path) -> None:
 
 
 def _write(taken: RgbdCapture, out: Path) -> None:
-    """Write beside the target and move it there whole: stopped at any moment, nothing half-written stays."""
     from core.capture import write_capture
 
-    try:
-        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    except OSError as error:
-        raise WorkError(f"{out}: cannot be written ({error.strerror}).", "Check the free space.") from error
-    try:
-        write_capture(taken, staging / "capture")
-        _check_target(out)
-        (staging / "capture").rename(out)
-    except OSError as error:
-        raise WorkError(f"{out}: cannot be written ({error.strerror}).", "Check the free space.") from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    _check_target(out)
+    write_capture(taken, out)
 
 
 class _Shown:

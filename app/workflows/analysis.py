@@ -89,9 +89,10 @@ def take(
 
 
 def camera_id_of_path(path: Path) -> str:
-    """Camera id of a recording on disk: an .oni file, else a capture folder (or the capture.json in it)."""
-    if path.suffix.lower() == ".oni":
-        return f"recording:{path}"
+    """Camera id of what is on disk: an .oni, .bag or .db3 recording, a capture folder or its capture.json."""
+    kinds = {".oni": "recording", ".bag": "realsense-bag", ".db3": "realsense-bag"}
+    if kind := kinds.get(path.suffix.lower()):
+        return f"{kind}:{path}"
     return f"folder:{path.parent if path.name == 'capture.json' else path}"
 
 

@@ -127,12 +127,13 @@ def write_capture(capture: RgbdCapture, folder: Path) -> None:
             _write_synced(staging / name, data)
         _swap(staging, folder)
     except OSError as error:
-        if staging is not None:
-            shutil.rmtree(staging, ignore_errors=True)
         raise InputError(
             f"{folder}: the capture cannot be written ({error.strerror or error}).",
             "Check the folder's permissions and the free space.",
         ) from error
+    finally:  # after Ctrl-C, too
+        if staging is not None:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def _read_rig(fields: Fields) -> tuple[CameraRig, Path | None]:

@@ -40,3 +40,18 @@ def test_a_first_visit_from_recordings(clinic: Clinic, take: Take, tmp_path: Pat
 def _play(path: Path) -> RgbdCapture:
     with open_device(camera_id_of_path(path)) as camera:
         return take_with(camera, view="front", stance="psi", frames=2)
+
+
+@pytest.mark.parametrize(
+    ("name", "camera"),
+    [
+        ("a.oni", "recording:a.oni"),
+        ("A.ONI", "recording:A.ONI"),
+        ("a.bag", "realsense-bag:a.bag"),
+        ("a.db3", "realsense-bag:a.db3"),
+        ("visit", "folder:visit"),
+        ("visit/capture.json", "folder:visit"),
+    ],
+)
+def test_a_file_names_the_camera_that_plays_it(name: str, camera: str) -> None:
+    assert camera_id_of_path(Path(name)) == camera

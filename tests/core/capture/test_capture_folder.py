@@ -121,6 +121,29 @@ def test_a_failed_write_leaves_the_older_capture_and_nothing_else(
     assert [p.name for p in folder.parent.iterdir()] == ["front"]
 
 
+def test_an_interrupted_write_leaves_the_older_capture_and_nothing_else(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(path: Path, data: bytes) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("core.capture.folder._write_synced", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_capture(make_capture(stance="lost"), folder)
+    assert read_capture(folder).stance == "psi"
+    assert [p.name for p in folder.parent.iterdir()] == ["front"]
+
+
+def test_the_sensor_and_the_calibration_are_kept(tmp_path: Path) -> None:
+    document = {"format": "geoderm-calibration/1", "id": "a1", "version": 2}
+    write_capture(make_capture(sensor="kinect-v2", calibration=document), tmp_path / "known")
+    kept = read_capture(tmp_path / "known")
+    assert (kept.sensor, kept.calibration) == ("kinect-v2", document)
+    write_capture(make_capture(), tmp_path / "unknown")
+    kept = read_capture(tmp_path / "unknown")
+    assert (kept.sensor, kept.calibration) == ("", None)
+
+
 @pytest.mark.parametrize(("name", "exact"), [("color.tif", True), ("color.jpg", False)])
 def test_tiff_and_jpeg_pictures_are_read(folder: Path, name: str, exact: bool) -> None:
     smooth = cv2.resize(np.arange(12, dtype=np.uint8).reshape(2, 2, 3) * 20, (80, 60))
