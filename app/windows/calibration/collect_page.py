@@ -16,7 +16,7 @@ from app.windows.calibration.wording import rms_in_words
 from app.windows.calibration.work import Findings
 from app.workflows.calibrating import Outcome
 
-_SIDE_W = 380
+_SIDE_W = 404
 _SIGNS = {
     Outcome.NOTHING: ("info", palette.SECONDARY),
     Outcome.REFUSED: ("move", palette.AMBER),
@@ -108,7 +108,7 @@ class CollectPage(Page):
         self.rms = label("", "caption", "collect_rms", wrap=True)
         column.addWidget(self.rms)
         frame, inner = card(margin=4)
-        self.views = RowTable([Column("#", 54), Column("Where"), Column("Tilt", 128), Column("m", 54)])
+        self.views = RowTable([Column("#", 54), Column("Where"), Column("Tilt", 138), Column("m", 54)])
         self.views.setObjectName("collect_views")
         self.views.setAccessibleName("Views taken")
         self.views.verticalHeader().setDefaultSectionSize(34)
