@@ -26,6 +26,8 @@ ROOM_AGE_S: Final = 5.0
 
 _FARTHEST_M: Final = 6.0
 _PERSON_M2: Final = 0.05
+_MOST_M2: Final = 1.6
+_RELOOK_S: Final = 0.3
 _PERSON_PIXELS: Final = 90
 _REACH_M: Final = 0.25
 _AHEAD_M: Final = 0.95
@@ -57,6 +59,18 @@ class Person:
     high_m: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Connected parts of the scene and their measures, one row each."""
+
+    labels: NDArray[np.int32]
+    pixels: NDArray[np.int64]
+    area: FloatArray
+    center: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
 class PersonFinder:
     """Finds the person in successive moments of one camera that stands still."""
 
@@ -66,37 +80,32 @@ class PersonFinder:
 
     def find(self, moment: Moment) -> Person | None:
         """The large, central, near person of a moment, or None if nobody is there."""
+        inside = (moment.depth_m > 0) & (moment.depth_m < _FARTHEST_M)
+        age = moment.time_s - self._looked_s
+        if not 0.0 <= age <= ROOM_AGE_S:
+            self._look_at_room(moment, inside)
+            age = 0.0
+        parts = self._parts(moment, inside)
+        if age > _RELOOK_S and bool((parts.area > _MOST_M2).any()):
+            # larger than any person: the camera was moved, and the room is not where it was
+            self._look_at_room(moment, inside)
+            parts = self._parts(moment, inside)
+        return _person_among(parts, moment)
+
+    def _parts(self, moment: Moment, inside: BoolArray) -> _Parts:
+        """Connected parts of what stands before walls and floor."""
         from core.surface.depth_kernels import label_components, measure_parts
 
-        depth = moment.depth_m
-        inside = (depth > 0) & (depth < _FARTHEST_M)
-        if moment.time_s - self._looked_s > ROOM_AGE_S or moment.time_s < self._looked_s:
-            self._look_at_room(moment, inside)
+        free = inside.copy()
         for plane in self._planes:
-            inside &= plane.distances(moment.points) < -plane.tolerance(moment.points)
-        left = np.where(inside, depth, 0.0)
+            free &= plane.distances(moment.points) < -plane.tolerance(moment.points)
+        left = np.where(free, moment.depth_m, 0.0)
         # noise is that of single pixels, but neighbours are several apart: a slanted limb must hold together
         labels, count = label_components(left, np.maximum(0.07, 0.02 * left * left))
-        if count == 0:
-            return None
         pixels, sums = measure_parts(labels, moment.points, count)
         area = sums[:, 0] / (moment.camera.fx * moment.camera.fy)
         center = sums[:, 1:4] / np.maximum(pixels, 1)[:, None]
-        low, high = sums[:, 4:7], sums[:, 7:10]
-        aside = center[:, 0] / np.maximum(center[:, 2], 0.1)
-        score = area * np.exp(-((aside / 0.4) ** 2)) / np.maximum(center[:, 2], 0.3)
-        main = int(score.argmax())
-        if area[main] < _PERSON_M2 or pixels[main] < _PERSON_PIXELS:
-            return None
-        middle = center[main]
-        near = ((center > low[main] - _REACH_M) & (center < high[main] + _REACH_M))[:, :2].all(axis=1)
-        ahead = middle[2] - center[:, 2]
-        belongs = near & (ahead < _AHEAD_M) & (ahead > -0.4) & (area < 0.4 * area[main])
-        belongs &= pixels >= _SPECK_PIXELS
-        belongs[main] = True
-        mask = belongs[labels] & (labels >= 0)
-        z = float(np.median(depth[mask]))
-        return Person(mask, missing_within(mask, depth, moment.camera.fx / z), z, low[main], high[main])
+        return _Parts(labels, pixels, area, center, sums[:, 4:7], sums[:, 7:10])
 
     def _look_at_room(self, moment: Moment, inside: BoolArray) -> None:
         """Find walls and floor again."""
@@ -114,6 +123,26 @@ class PersonFinder:
                 free &= wall.distances(points) < -wall.tolerance(points)
             floor = find_floor(points[free], rows[free] > 0.5 * camera.height)
         self._planes = planes if floor is None else [*planes, floor]
+
+
+def _person_among(parts: _Parts, moment: Moment) -> Person | None:
+    """The part that is a person, with the limbs that something in front cut off."""
+    area, center, low, high = parts.area, parts.center, parts.low, parts.high
+    aside = center[:, 0] / np.maximum(center[:, 2], 0.1)
+    score = area * np.exp(-((aside / 0.4) ** 2)) / np.maximum(center[:, 2], 0.3)
+    score[(area > _MOST_M2) | (area < _PERSON_M2) | (parts.pixels < _PERSON_PIXELS)] = 0.0
+    if not len(score) or score.max() <= 0.0:
+        return None
+    main = int(score.argmax())
+    near = ((center > low[main] - _REACH_M) & (center < high[main] + _REACH_M))[:, :2].all(axis=1)
+    ahead = center[main, 2] - center[:, 2]
+    belongs = near & (ahead < _AHEAD_M) & (ahead > -0.4) & (area < 0.4 * area[main])
+    belongs &= parts.pixels >= _SPECK_PIXELS
+    belongs[main] = True
+    mask = belongs[parts.labels] & (parts.labels >= 0)
+    z = float(np.median(moment.depth_m[mask]))
+    missing = missing_within(mask, moment.depth_m, moment.camera.fx / z)
+    return Person(mask, missing, z, low[main], high[main])
 
 
 def missing_within(mask: BoolArray, depth: FloatArray, pixels_per_m: float) -> BoolArray:

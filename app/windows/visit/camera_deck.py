@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from devices.camera import DepthCamera, DeviceInfo
     from devices.live import LiveCamera
 
+SIMULATED = "Not calibrated: a simulated camera knows its geometry."
 NOT_CALIBRATED = "Not calibrated: places on the skin may be off by a centimetre. Calibrate the camera."
 
 
@@ -179,6 +180,6 @@ def _calibration_text(camera: LiveCamera) -> str:
     except GeodermError:
         return ""
     if profile is None:
-        return NOT_CALIBRATED
+        return SIMULATED if camera.info.kind == "simulator" else NOT_CALIBRATED
     made = profile.made_at.astimezone().strftime("%d %B %Y").lstrip("0")
     return f"Calibrated on {made} (version {profile.version})."

@@ -78,6 +78,16 @@ def test_nobody_in_view_and_a_covered_camera_are_told_apart(still: RgbdCapture) 
     assert not play(wall).placed
 
 
+def test_a_camera_that_is_moved_does_not_take_the_wall_for_the_person(still: RgbdCapture) -> None:
+    guide = LiveGuide()
+    depth = still.depth_frames[0]
+    for time_s, nearer in ((0.0, 0), (1.0, 0), (1.1, 250)):
+        moved = np.where(depth > 0, depth - np.uint16(nearer), 0).astype(np.uint16)
+        found = guide.update(time_s, moved, still.depth_unit_m, still.color, still.rig)
+    assert found["distance"].value == pytest.approx(2.25, abs=0.1)
+    assert found["frame"].state == "good"
+
+
 def test_too_near_is_told_with_what_is_cut_off(too_near: RgbdCapture) -> None:
     found = play(too_near)
     assert found["distance"].state == "fair"
