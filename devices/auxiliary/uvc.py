@@ -11,13 +11,13 @@ from urllib.parse import parse_qsl
 
 from core.errors import InputError
 from devices.auxiliary.camera import ColorCameraInfo, ColorIdentity, TimedPicture
-from devices.auxiliary.own_process import CameraProcess
 from devices.auxiliary.usb_names import node_of_path, video_node, video_nodes
+from devices.camera_process.host import CameraProcess
 from devices.live import CameraControl, LiveState, StreamMode
 
 if TYPE_CHECKING:
-    from devices.auxiliary.packets import Packet
     from devices.auxiliary.uvc_source import UvcSource
+    from devices.camera_process.packets import Packet
 
 _ADVICE = "Unplug and reconnect the colour camera, then try again."
 _LATENCY_RANGE_S = (-1.0, 5.0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from core.errors import InputError, WorkError
 from devices.auxiliary.camera import MOST_PIXELS
-from devices.auxiliary.packets import Packet, SourceGone
+from devices.camera_process.packets import Packet, SourceGone
 
 FILE_BACKENDS = ("FFMPEG", "CV_IMAGES", "CV_MJPEG", "GSTREAMER")
 _COMMON_SIZES = (

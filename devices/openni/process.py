@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import threading
 import time
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any
 
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
+from devices.child_process import ChildProcess
 
 ANSWER_TIMEOUT_S = 20.0
 _ADVICE = {
@@ -31,18 +30,14 @@ class RuntimeProcess:
     def __init__(self, source: str = "camera") -> None:
         self._source = source
         self._lock = threading.RLock()
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self._process: ChildProcess | None = None
         self._busy = False
 
     @property
     def alive(self) -> bool:
         """Whether the process runs."""
         process = self._process
-        try:
-            return process is not None and process.is_alive()
-        except ValueError:  # closed by another thread this moment
-            return False
+        return process is not None and process.alive
 
     @property
     def pid(self) -> int | None:
@@ -117,33 +112,18 @@ class RuntimeProcess:
         )
 
     def _started(self) -> Connection:
-        if self._pipe is not None:
-            if self.alive:
-                return self._pipe
+        if self._process is not None:
+            if self._process.alive:
+                return self._process.pipe
             raise EOFError  # it ended since the last request: that is told once, then a new one is started
-        self.stop()
         from devices.openni.worker import serve
 
-        context = multiprocessing.get_context("spawn")
-        here, there = context.Pipe()
-        process = context.Process(target=serve, args=(there,), name="geoderm-openni2", daemon=True)
-        process.start()
-        there.close()
-        self._process, self._pipe = process, here
-        return here
+        self._process = ChildProcess(serve, "geoderm-openni2")
+        return self._process.pipe
 
     def stop(self, patience_s: float = 1.0) -> None:
         """End the process and wait for it: no zombie stays behind."""
         with self._lock:
-            pipe, self._pipe = self._pipe, None
             process, self._process = self._process, None
-            if pipe is not None:
-                pipe.close()
-            if process is None:
-                return
-            process.join(patience_s)
-            if process.is_alive():
-                process.kill()
-                process.join(5.0)
-            if not process.is_alive():
-                process.close()
+            if process is not None:
+                process.end(patience_s)

@@ -12,10 +12,10 @@ from core.calibration.profile import CalibrationProfile
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
-from devices.auxiliary.own_process import CameraProcess
 from devices.auxiliary.profiles import check_profile, fits_sizes
 from devices.burst import assemble_capture, collect_burst
 from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera_process.host import CameraProcess
 from devices.live import (
     DEFAULT_STREAMS,
     CameraControl,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from core.errors import InputError, WorkError
-from devices.auxiliary.packets import Packet
+from devices.camera_process.packets import Packet
 from devices.realsense import library
 from devices.realsense.frames import kind_of, pixels_of
 from devices.realsense.geometry import camera_facts

@@ -14,10 +14,10 @@ import numpy as np
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError
 from core.progress import Progress, no_progress
-from devices.auxiliary.own_process import CameraProcess
-from devices.auxiliary.packets import Packet
 from devices.burst import Burst, assemble_capture
 from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera_process.host import CameraProcess
+from devices.camera_process.packets import Packet
 from devices.live import LiveState
 from devices.realsense.camera import SENSOR, factory_rig
 from devices.realsense.playback import PlaybackSource

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from core.errors import InputError, WorkError
-from devices.auxiliary.packets import Packet, SourceGone
+from devices.camera_process.packets import Packet, SourceGone
 from devices.realsense import library
 from devices.realsense.controls import read_controls, write_control
 from devices.realsense.frames import KINDS, FrameClock, kind_of, pixels_of

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any
 
 from core.errors import Cancelled, InputError, WorkError
 from core.progress import Progress, no_progress
+from devices.child_process import ChildProcess
 from devices.simulator.live_parcel import receive
 
 _POLL_S = 0.05
@@ -25,8 +24,7 @@ class DrawingProcess:
 
     def __init__(self) -> None:
         self._turn = threading.Lock()
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self._process: ChildProcess | None = None
         self._number = 0
         self._abandoned = False
 
@@ -116,31 +114,18 @@ class DrawingProcess:
             raise
 
     def _started(self) -> Connection:
-        if self._pipe is not None and self._process is not None and self._process.is_alive():
-            return self._pipe
+        if self._process is not None and self._process.alive:
+            return self._process.pipe
         self._end()
         from devices.simulator.live_worker import serve
 
-        context = multiprocessing.get_context("spawn")
-        here, there = context.Pipe()
-        process = context.Process(target=serve, args=(there,), name="geoderm-simulator", daemon=True)
-        process.start()
-        there.close()
-        self._process, self._pipe, self._abandoned = process, here, False
-        return here
+        self._process, self._abandoned = ChildProcess(serve, "geoderm-simulator"), False
+        return self._process.pipe
 
     def _end(self) -> None:
-        if self._pipe is not None:
-            self._pipe.close()
-            self._pipe = None
-        if self._process is not None:
-            self._process.join(1.0)
-            if self._process.is_alive():
-                self._process.kill()
-                self._process.join(5.0)
-            if not self._process.is_alive():
-                self._process.close()
-            self._process = None
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
 
     def end(self) -> None:
         """End the process; a later request starts another."""

@@ -6,15 +6,13 @@ structures and coordinates are tested with a library of the same C interface; th
 
 from __future__ import annotations
 
-import multiprocessing
 import threading
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any, Final
 
 from core.anchors.tracked import TrackedPerson
 from core.capture.camera import PinholeCamera
 from core.errors import WorkError
+from devices.child_process import ChildProcess
 from devices.trackers.nite2_worker import serve
 
 START_TIMEOUT_S: Final = 20.0
@@ -35,19 +33,13 @@ class Nite2Tracker:
     def __init__(self, camera: PinholeCamera | None = None) -> None:
         self._camera = camera
         self._lock = threading.Lock()
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        self._process: ChildProcess | None = None
 
     def start(self, source: str = "") -> None:
         """Begin to follow people; see `core.anchors.tracked.DepthTracker.start`."""
         with self._lock:
             self._stop()
-            context = multiprocessing.get_context("spawn")
-            here, there = context.Pipe()
-            self._process = context.Process(target=serve, args=(there,), name="geoderm-nite2", daemon=True)
-            self._process.start()
-            there.close()
-            self._pipe = here
+            self._process = ChildProcess(serve, "geoderm-nite2")
             try:
                 self._ask("start", START_TIMEOUT_S, source=source)
             except WorkError:
@@ -73,17 +65,18 @@ class Nite2Tracker:
         return None if self._process is None else self._process.pid
 
     def _ask(self, operation: str, timeout_s: float, **arguments: object) -> Any:
-        if self._pipe is None:
+        if self._process is None:
             raise WorkError("The NiTE2 tracker was not started.")
+        pipe = self._process.pipe
         try:
-            self._pipe.send((operation, arguments))
-            if not self._pipe.poll(timeout_s):
+            pipe.send((operation, arguments))
+            if not pipe.poll(timeout_s):
                 self._stop()
                 raise WorkError(
                     f"NiTE2 did not answer for {timeout_s:.0f} seconds.",
                     "Check the camera's cable, then start the tracker again.",
                 )
-            answer = self._pipe.recv()
+            answer = pipe.recv()
         except (EOFError, OSError) as error:
             self._stop()
             raise WorkError(
@@ -94,14 +87,6 @@ class Nite2Tracker:
         raise WorkError(answer[1], answer[2])
 
     def _stop(self) -> None:
-        pipe, self._pipe = self._pipe, None
         process, self._process = self._process, None
-        if pipe is not None:
-            pipe.close()
-        if process is None:
-            return
-        process.join(_GRACE_S)
-        if process.is_alive():
-            process.kill()
-            process.join(5.0)
-        process.close()
+        if process is not None:
+            process.end(_GRACE_S)

@@ -7,21 +7,18 @@ can crash when a cable is pulled. A thread that hangs cannot be ended and keeps 
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
-from devices.auxiliary.packets import CameraSource, Packet, Placed, take
+from devices.camera_process.packets import CameraSource, Packet, Placed, take
+from devices.child_process import ChildProcess
 from devices.live import STALLED_AFTER_S, LiveState
 
 OPEN_TIMEOUT_S = 20.0
@@ -37,24 +34,6 @@ class _Notice:
     stamp: int
     places: list[Placed]
     facts: Mapping[str, Any]
-
-
-@contextlib.contextmanager
-def _deaf_to_interrupt() -> Iterator[None]:
-    """What is started inside never hears Ctrl-C; we hear one that comes meanwhile afterwards.
-
-    The process would otherwise die with a traceback while it starts, before it can say that it does not care.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    # Starting this helper for the first time unblocks the signal again.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class CameraProcess:
@@ -76,7 +55,7 @@ class CameraProcess:
     ) -> None:
         self._source, self._name, self._advice = source, name, advice
         self._stalled_after_s = stalled_after_s
-        self._process: BaseProcess | None = None
+        self._process: ChildProcess | None = None
         self._pipe: Connection | None = None
         self._reader: threading.Thread | None = None
         self._news = threading.Condition()
@@ -116,18 +95,11 @@ class CameraProcess:
         WorkError
             If the camera cannot be opened, or not within ``timeout_s``.
         """
-        from devices.auxiliary.worker import serve
+        from devices.camera_process.worker import serve
 
         self.close()
-        context = multiprocessing.get_context("spawn")
-        here, there = context.Pipe()
-        process = context.Process(
-            target=serve, args=(there, self._source), name="geoderm-camera", daemon=True
-        )
-        with _deaf_to_interrupt():
-            process.start()
-        there.close()
-        self._process, self._pipe = process, here
+        self._process = ChildProcess(serve, "geoderm-camera", self._source)
+        self._pipe = self._process.pipe
         self._reader = threading.Thread(target=self._listen, name="geoderm-camera-reader", daemon=True)
         self._reader.start()
         try:
@@ -219,14 +191,9 @@ class CameraProcess:
             assert reader is not None
             with contextlib.suppress(OSError):
                 pipe.send(("close",))
-            process.join(1.5)
-            if process.is_alive():
-                process.kill()
-                process.join(5.0)
+            process.finish(1.5)
             reader.join(5.0)
-            pipe.close()
-            if not process.is_alive():
-                process.close()
+            process.end()
         with self._memory_lock:
             for memory in self._memory.values():
                 memory.close()
@@ -284,7 +251,7 @@ class CameraProcess:
                 wait([pipe, process.sentinel], 1.0)
                 if pipe.poll(0):
                     self._hear(pipe, pipe.recv())
-                elif not process.is_alive():
+                elif not process.alive:
                     break
         except (EOFError, OSError):
             pass

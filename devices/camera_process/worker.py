@@ -13,7 +13,7 @@ from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
 from core.errors import GeodermError, InputError
-from devices.auxiliary.packets import CameraSource, Packet, SourceGone, place, slot_bytes
+from devices.camera_process.packets import CameraSource, Packet, SourceGone, place, slot_bytes
 
 _MEMORY_TIMEOUT_S = 10.0
 _SLOTS = 3

@@ -1,0 +1,1 @@
+"""A camera whose library may block or crash, read in a process of its own: frames come by shared memory."""
