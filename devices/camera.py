@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal, Protocol, Self, runtime_checkable
@@ -98,3 +99,27 @@ class DepthCamera(Protocol):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None: ...
+
+
+class OpenedByWith(ABC):
+    """Makes a camera a context manager: opens, then closes."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """See `DepthCamera.open`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """See `DepthCamera.close`."""
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()

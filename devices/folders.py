@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
 from core.capture import RgbdCapture, read_capture
 from core.errors import InputError
 from core.progress import Progress, no_progress
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 
 
-class FolderCamera:
+class FolderCamera(OpenedByWith):
     """Delivers the capture of one capture folder (``geoderm-capture/1``).
 
     Parameters
@@ -56,18 +54,6 @@ class FolderCamera:
     def close(self) -> None:
         """Forget the capture."""
         self._capture = None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 class _Folders:

@@ -6,8 +6,6 @@ import threading
 import time
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -23,7 +21,7 @@ from devices.auxiliary.latency import Latency, Movement, find_latency, small_gre
 from devices.auxiliary.pairing import DepthTrail, PairedMotion
 from devices.auxiliary.profiles import check_profile
 from devices.burst import assemble_capture
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import (
     DEFAULT_STREAMS,
     CameraControl,
@@ -52,7 +50,7 @@ _OPEN_TIMEOUT_S = 8.0
 _FIRST_FRAME_S = 30.0
 
 
-class RigCamera:
+class RigCamera(OpenedByWith):
     """A depth camera whose pictures come from an auxiliary colour camera.
 
     The pictures in live frames are shared between frames and read only: one of 24 megapixels has 72 MB.
@@ -279,18 +277,6 @@ class RigCamera:
         finally:
             self._depth.close()
         self._picture, self._trail = None, None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _depth_frame(self, after: int, timeout_s: float) -> LiveFrame | None:
         """Newest depth frame, remembered for the check of movement."""

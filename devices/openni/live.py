@@ -5,8 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Collection
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from core.capture.transform import RigidTransform
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 from devices.burst import assemble_capture, collect_burst
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import (
     DEFAULT_STREAMS,
     STALLED_AFTER_S,
@@ -46,7 +45,7 @@ _POLL_S = 0.002
 _VGA = StreamInfo(640, 480, None, 0.001, False)
 
 
-class OpenNICamera:
+class OpenNICamera(OpenedByWith):
     """A connected camera (Kinect class) through the OpenNI2 runtime.
 
     The runtime works in a process of its own, which streams into shared memory; `latest` copies from there.
@@ -184,18 +183,6 @@ class OpenNICamera:
                 ring.close()
             if failure is None or self._failure is None:
                 self._failure = failure
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     # --- streams
 

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ from core.capture.mirror import mirror_camera, mirror_transform, unmirror
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import LiveFrame
 from devices.openni.calibration import (
     NOMINAL_WARNING,
@@ -39,7 +37,7 @@ MAX_STREAM_WIDTH = 1600
 """Wider colour frames are not delivered by the runtime when it plays a file (measured: 2048 is too wide)."""
 
 
-class OniRecording:
+class OniRecording(OpenedByWith):
     """An ``.oni`` file played by the OpenNI2 runtime, frame by frame; none is left out.
 
     Each capture takes the next frames of the file; at its end the file starts again.
@@ -153,18 +151,6 @@ class OniRecording:
             self._ring.close()
             self._ring = None
         self._runtime.stop()
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def frames(self) -> Iterator[LiveFrame]:
         """The frames from here to the end of the file, not mirrored, with the recorded times.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 from devices.auxiliary.profiles import check_profile, fits_sizes
 from devices.burst import assemble_capture, collect_burst
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.camera_process.host import CameraProcess
 from devices.live import (
     DEFAULT_STREAMS,
@@ -41,7 +40,7 @@ _PREVIEW_WIDTH = 320
 _CLOSED = WorkError("The RealSense camera is closed.", "Open it first.")
 
 
-class RealSenseCamera:
+class RealSenseCamera(OpenedByWith):
     """A RealSense camera; the library works in a process of its own.
 
     Parameters
@@ -191,18 +190,6 @@ class RealSenseCamera:
     def close(self) -> None:
         """End the library's process."""
         self._process.close()
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _learn(self, facts: Mapping[str, Any]) -> None:
         self._factory, self._lens_warnings = factory_rig(facts)

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError
 from core.progress import Progress, no_progress
 from devices.burst import Burst, assemble_capture
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.camera_process.host import CameraProcess
 from devices.camera_process.packets import Packet
 from devices.live import LiveState
@@ -27,7 +25,7 @@ _BURST_TIMEOUT_S = 60.0
 _MAGIC = {".bag": b"#ROSBAG V2.0", ".db3": b"SQLite format 3\0"}
 
 
-class RealSenseRecording:
+class RealSenseRecording(OpenedByWith):
     """A recording; each capture takes its next frames, and after the last one it starts again.
 
     The cameras are those that the recording tells (the factory's calibration at the time).
@@ -107,18 +105,6 @@ class RealSenseRecording:
     def close(self) -> None:
         """End the library's process."""
         self._process.close()
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _burst(self, frames: int, progress: Progress) -> Packet:
         self.open()

@@ -12,8 +12,6 @@ from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -22,7 +20,7 @@ from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import GeodermError, InputError, WorkError
 from core.progress import Progress, no_progress
 from devices.burst import assemble_capture, collect_burst
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import (
     DEFAULT_STREAMS,
     STALLED_AFTER_S,
@@ -39,7 +37,7 @@ LONGEST_GAP_S = 1.0
 """A pause of the recording (between two bursts) is played no longer than this."""
 
 
-class PlayedCamera:
+class PlayedCamera(OpenedByWith):
     """A recording as a live camera. Its geometry, depth correction and sensor are those it was made with.
 
     Parameters
@@ -129,18 +127,6 @@ class PlayedCamera:
         self._source.close()
         with self._news:
             self._failure, self._frame = None, None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _play(self) -> None:
         try:

@@ -7,8 +7,7 @@ import time
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from urllib.parse import parse_qsl
 
 import cv2
@@ -23,7 +22,7 @@ from core.capture.transform import RigidTransform
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 from devices.burst import assemble_capture, collect_burst
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import (
     DEFAULT_STREAMS,
     CameraControl,
@@ -111,7 +110,7 @@ class BoardMotion:
         return RigidTransform(np.asarray(rotation, float), centre - rotation @ self._centre)
 
 
-class SimulatedBoardCamera:
+class SimulatedBoardCamera(OpenedByWith):
     """A live camera before which a calibration board moves slowly through good poses.
 
     Parameters
@@ -299,18 +298,6 @@ class SimulatedBoardCamera:
         with self._lock:
             self._streams = frozenset()
             self._renderer = self._motion = self._last = None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _copied(frame: LiveFrame) -> LiveFrame:

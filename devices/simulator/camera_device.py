@@ -6,8 +6,7 @@ import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import cv2
@@ -17,7 +16,7 @@ from core.calibration.profile import CalibrationProfile
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
-from devices.camera import DEFAULT_FRAMES, DeviceInfo, PreviewFrame
+from devices.camera import DEFAULT_FRAMES, DeviceInfo, OpenedByWith, PreviewFrame
 from devices.live import (
     DEFAULT_STREAMS,
     CameraControl,
@@ -54,7 +53,7 @@ class SimulatedScene:
     seed: int | None = None
 
 
-class SimulatedCamera:
+class SimulatedCamera(OpenedByWith):
     """A virtual depth camera with a simulated patient in front of it: a `devices.live.LiveCamera`.
 
     The viewfinder's picture is that of the colour camera reduced to 640 pixels, and `rig` is the geometry of
@@ -390,15 +389,3 @@ class SimulatedCamera:
                 "admit", token=self._token, shape=self._shape, seed=self._seed, parcel=parcel, stop=stop
             )
         return DRAWING.request(operation, token=self._token, progress=progress, stop=stop, **arguments)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
