@@ -251,11 +251,12 @@ class CaptureSteps(QObject):
 
     def _on_corrected(self, judged: Judged) -> None:
         self._latest = judged
-        if judged.new.good:
+        if judged.new.good or judged.quality.grade == "refused":
             self._pending = judged
+            self.refresh()
         else:
-            self._host.session.stance_candidate = judged.new
-        self.refresh()
+            self._pending = None
+            self._host.session.adopt_stance(judged.new)
 
     # --- the camera ----------------------------------------------------------------------------------
 
