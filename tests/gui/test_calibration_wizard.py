@@ -14,6 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog
 
+from app.windows.calibration import known_cameras
 from app.windows.calibration.board_choice import BoardChoice, load_choice, read_width, store_choice
 from app.windows.calibration.last_checks import load_checks
 from app.windows.calibration.pictures import BoardPicture, CoverageGauge
@@ -21,6 +22,7 @@ from app.windows.calibration.wizard import CalibrationWizard
 from core.calibration.profile import ProfileStore
 from core.capture.transform import RigidTransform
 from core.errors import WorkError
+from core.progress import no_progress
 from devices.camera import DeviceInfo
 from devices.live import LiveFrame, LiveState
 from devices.simulator import SimulatedCamera
@@ -342,6 +344,25 @@ def test_the_window_goes_on_while_the_board_is_looked_for(wizard: Wizard) -> Non
         time.sleep(0.002)
     assert wizard.views > 1
     assert max(turns) < 0.05, f"{1e3 * np.array(sorted(turns)[-5:])} ms of processor time in one turn"
+
+
+def test_the_registry_is_asked_itself_and_a_kind_that_fails_hides_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from app.context import RegisteredCameras
+    from devices import registry
+
+    def listed(kind: str) -> list[DeviceInfo]:
+        if kind == "openni":
+            raise WorkError("The runtime is not installed.", "Install it.")
+        ids = {"simulator-board": ["simulator-board:kinect"], "simulator": ["simulator:child10"]}.get(
+            kind, []
+        )
+        return [DeviceInfo(device_id, device_id, "simulator", True) for device_id in ids]
+
+    monkeypatch.setattr(registry, "list_devices", listed)
+    found = known_cameras.ask_cameras(RegisteredCameras(), ProfileStore(tmp_path), no_progress)
+    assert [(camera.info.id, camera.problem) for camera in found] == [("simulator-board:kinect", "")]
 
 
 # --- without a window ---------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from core.calibration.profile import CalibrationProfile, ProfileStore
     from devices.camera import DeviceInfo
     from devices.live import CameraIdentity
+
+
+_LOGGER = logging.getLogger("geoderm.cameras")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +47,32 @@ def calibratable(devices: Sequence[DeviceInfo]) -> list[DeviceInfo]:
     return [d for d in devices if d.live and not d.id.startswith("simulator:")]
 
 
+def _listed(source: CameraSource, progress: Progress) -> list[DeviceInfo]:
+    """What is connected now. The registry is asked itself: its `CameraSource` tells what was there before."""
+    from app.context import RegisteredCameras
+    from devices.registry import camera_kinds, list_devices
+
+    if not isinstance(source, RegisteredCameras):
+        return calibratable(source.list())
+    found: list[DeviceInfo] = []
+    kinds = camera_kinds()
+    for k, kind in enumerate(kinds):
+        progress(0.5 * k / len(kinds), "Looking for cameras")
+        try:
+            found += list_devices(kind)
+        except GeodermError as error:
+            _LOGGER.warning("Cameras of kind %s could not be listed: %s", kind, error.message)
+    return calibratable(found)
+
+
 def ask_cameras(source: CameraSource, store: ProfileStore, progress: Progress) -> list[KnownCamera]:
     """Open each camera for a moment and ask who it is."""
     from devices.live import LiveCamera
 
-    found = calibratable(source.list())
+    found = _listed(source, progress)
     known = []
     for k, info in enumerate(found):
-        progress(k / len(found), f"Asking {info.name}")
+        progress(0.5 + 0.5 * k / len(found), f"Asking {info.name}")
         try:
             camera = source.open(info.id)
             with camera:
