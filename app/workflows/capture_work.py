@@ -6,11 +6,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.workflows.analysis import AnalysisCache, NewCapture, Role, TrackerSource, analyse_new
+from app.workflows.joint_correction import anchor_records
 from app.workflows.snapshot import VisitSnapshot
 from app.workflows.table import Refused
 from core.capture.rgbd import RgbdCapture
 from core.progress import Progress, ScaledProgress, no_progress
-from core.records import AnchorRecord, CaptureRecord
+from core.records import CaptureRecord
 
 if TYPE_CHECKING:
     from core.anchors import AnalysedCapture, SkeletonCalibration
@@ -53,7 +54,7 @@ class CaptureWork:
         record = self._store.captures.add(
             self._snapshot().visit.id, new.analysed.capture, new.role, by=self._user_id, progress=progress
         )
-        self._store.anchors.put(record.id, _anchor_records(new.analysed))
+        self._store.anchors.put(record.id, anchor_records(new.analysed))
         self._cache.put(record.id, new.analysed)
         _warm_up_clicks(new.analysed)
         return record
@@ -101,24 +102,3 @@ def _warm_up_clicks(analysed: AnalysedCapture) -> None:
 
     rig = analysed.capture.rig
     pick_skin(analysed.scan, rig.project_to_picture(analysed.scan.surface.vertices.mean(axis=0))[0])
-
-
-def _anchor_records(analysed: AnalysedCapture) -> list[AnchorRecord]:
-    records = []
-    for anchor in analysed.anchors.anchors:
-        joint = analysed.skeleton.joints.get(anchor.name) or analysed.skeleton.landmarks.get(anchor.name)
-        x, y, z = (float(c) for c in anchor.position_m)
-        records.append(
-            AnchorRecord(
-                anchor.name,
-                x,
-                y,
-                z,
-                None if joint is None else float(joint.pixel[0]),
-                None if joint is None else float(joint.pixel[1]),
-                0.0 if joint is None else float(joint.visibility),
-                float(anchor.sigma_m),
-                analysed.skeleton.source if joint is None else joint.source,
-            )
-        )
-    return records

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from core.capture.camera import PinholeCamera
+from core.calibration.camera_document import CameraDocument
+from core.capture.fields import read_bytes
 from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
 from core.errors import GeodermError, InputError, WorkError
@@ -109,8 +110,8 @@ class CalibrationProfile:
             "made_at": self.made_at.astimezone(UTC).isoformat(),
             "depth_serial": self.depth_serial,
             "color_serial": self.color_serial,
-            "depth": _camera_document(rig.depth),
-            "color": None if rig.color is None else _camera_document(rig.color),
+            "depth": rig.depth.document(),
+            "color": None if rig.color is None else rig.color.document(),
             "color_from_depth": None
             if rig.color_from_depth is None
             else rig.color_from_depth.matrix.tolist(),
@@ -241,15 +242,10 @@ class ProfileStore:
 
 def read_profile(path: Path) -> CalibrationProfile:
     """Read one profile file; raise `InputError` naming file and field if it cannot be used."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: not readable ({error.strerror}).") from error
-    if len(data) > _LIMIT_BYTES:
-        raise InputError(f"{path}: too large for a calibration.")
+    data = read_bytes(path, _LIMIT_BYTES)
     try:
         document = json.loads(data)
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is not JSON.") from error
     if not isinstance(document, dict):
         raise InputError(f"{path}: is not a calibration.")
@@ -260,26 +256,6 @@ def _safe(*serials: str) -> str:
     """File name made of serial numbers; the hash keeps names apart that look the same when made safe."""
     text = "+".join(s for s in serials if s)
     return f"{re.sub(r'[^A-Za-z0-9._+-]', '_', text)[:60]}-{sha256(text.encode()).hexdigest()[:6]}"
-
-
-def _camera_document(camera: PinholeCamera) -> dict[str, Any]:
-    names = ("width", "height", "fx", "fy", "cx", "cy")
-    return {**{name: getattr(camera, name) for name in names}, "distortion": list(camera.distortion)}
-
-
-class _Camera(BaseModel):
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
-    width: int = Field(gt=0, le=20000)
-    height: int = Field(gt=0, le=20000)
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    distortion: list[float] = []
-
-    def camera(self) -> PinholeCamera:
-        values = self.model_dump()
-        return PinholeCamera(**{**values, "distortion": tuple(values["distortion"])})
 
 
 class _Correction(BaseModel):
@@ -295,8 +271,8 @@ class _Document(BaseModel):
     made_at: datetime
     depth_serial: str
     color_serial: str = ""
-    depth: _Camera
-    color: _Camera | None = None
+    depth: CameraDocument
+    color: CameraDocument | None = None
     color_from_depth: list[list[float]] | None = None
     depth_correction: _Correction = _Correction()
     sigma: dict[str, float] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -49,6 +50,18 @@ class PinholeCamera:
             raise InputError("Camera image size and focal lengths must be positive.")
         if len(self.distortion) not in _DISTORTION_LENGTHS:
             raise InputError("Lens distortion must have 0, 4, 5, 8, 12 or 14 coefficients.")
+
+    def document(self) -> dict[str, Any]:
+        """The intrinsics as JSON holds them in capture folders, records and calibrations."""
+        return {
+            "width": int(self.width),
+            "height": int(self.height),
+            "fx": float(self.fx),
+            "fy": float(self.fy),
+            "cx": float(self.cx),
+            "cy": float(self.cy),
+            "distortion": [float(k) for k in self.distortion],
+        }
 
     @property
     def matrix(self) -> FloatArray:

@@ -298,12 +298,12 @@ def _files(capture: RgbdCapture) -> dict[str, bytes]:
         "depth": {
             "frames": list(files),
             "unit_m": capture.depth_unit_m,
-            "intrinsics": _camera_json(rig.depth),
+            "intrinsics": rig.depth.document(),
         },
         "mirrored": capture.mirrored,
     }
     if capture.color is not None and rig.color is not None and rig.color_from_depth is not None:
-        description["color"] = {"file": "color.png", "intrinsics": _camera_json(rig.color)}
+        description["color"] = {"file": "color.png", "intrinsics": rig.color.document()}
         description["color_from_depth"] = rig.color_from_depth.matrix.tolist()
         files["color.png"] = png_bytes(capture.color)
     if capture.joints_m is not None:
@@ -314,11 +314,6 @@ def _files(capture: RgbdCapture) -> dict[str, bytes]:
         description["calibration"] = capture.calibration
     files[CAPTURE_FILE] = json.dumps(description, indent=1, ensure_ascii=False).encode("utf-8")
     return files
-
-
-def _camera_json(camera: PinholeCamera) -> dict[str, object]:
-    names = ("width", "height", "fx", "fy", "cx", "cy")
-    return {**{name: getattr(camera, name) for name in names}, "distortion": list(camera.distortion)}
 
 
 def _write_synced(path: Path, data: bytes) -> None:

@@ -31,18 +31,6 @@ class EncodedCapture:
     color_file: bytes | None
 
 
-def _camera_document(camera: PinholeCamera) -> dict[str, Any]:
-    return {
-        "width": int(camera.width),
-        "height": int(camera.height),
-        "fx": float(camera.fx),
-        "fy": float(camera.fy),
-        "cx": float(camera.cx),
-        "cy": float(camera.cy),
-        "distortion": [float(k) for k in camera.distortion],
-    }
-
-
 def _camera(document: dict[str, Any]) -> PinholeCamera:
     values = {key: document[key] for key in ("width", "height", "fx", "fy", "cx", "cy")}
     return PinholeCamera(**values, distortion=tuple(document["distortion"]))
@@ -67,11 +55,11 @@ def encode_capture(capture: RgbdCapture) -> EncodedCapture:
         "depth": {
             "frames": names,
             "unit_m": float(capture.depth_unit_m),
-            "intrinsics": _camera_document(capture.rig.depth),
+            "intrinsics": capture.rig.depth.document(),
         },
     }
     if capture.rig.color is not None and capture.rig.color_from_depth is not None:
-        document["color"] = {"file": "color.png", "intrinsics": _camera_document(capture.rig.color)}
+        document["color"] = {"file": "color.png", "intrinsics": capture.rig.color.document()}
         document["color_from_depth"] = capture.rig.color_from_depth.matrix.tolist()
     if capture.joints_m is not None:
         document["joints_m"] = {

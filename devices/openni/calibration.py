@@ -14,16 +14,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
+from core.calibration.camera_document import CameraDocument
 from core.calibration.profile import CalibrationProfile
 from core.capture.camera import PinholeCamera
+from core.capture.fields import read_bytes
 from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
 from core.errors import GeodermError, InputError
@@ -38,28 +40,14 @@ NOMINAL_WARNING = (
 )
 _FORMAT = "geoderm-rig/1"
 _LIMIT_BYTES = 1_000_000
-
-
-class _Intrinsics(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    width: int = Field(gt=0, le=20000)
-    height: int = Field(gt=0, le=20000)
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    distortion: list[float] = []
-
-    def camera(self) -> PinholeCamera:
-        values = self.model_dump()
-        return PinholeCamera(**{**values, "distortion": tuple(values["distortion"])})
+_LIMIT_PICTURE_BYTES = 200_000_000
 
 
 class _RigFile(BaseModel):
     model_config = ConfigDict(extra="ignore")
     format: str
-    depth: _Intrinsics
-    color: _Intrinsics | None = None
+    depth: CameraDocument
+    color: CameraDocument | None = None
     color_from_depth: list[list[float]] | None = None
     picture: str | None = None
     sensor: str = ""
@@ -114,14 +102,9 @@ def read_calibration(recording: Path) -> RigCalibration | None:
         If there is one and it cannot be used.
     """
     path = calibration_path(recording)
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except OSError as error:
-        raise InputError(f"{path}: not readable ({error.strerror}).") from error
-    if len(data) > _LIMIT_BYTES:
-        raise InputError(f"{path}: too large for a calibration file.")
+    data = read_bytes(path, _LIMIT_BYTES)
     try:
         content = _RigFile.model_validate_json(data)
     except ValidationError as error:
@@ -159,7 +142,11 @@ def _read_picture(path: Path, name: str | None, rig: CameraRig) -> NDArray[np.ui
     import cv2
 
     file = path.with_name(name)
-    bgr = cv2.imread(str(file), cv2.IMREAD_COLOR)
+    data = np.frombuffer(read_bytes(file, _LIMIT_PICTURE_BYTES), np.uint8)
+    try:
+        bgr = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    except cv2.error:
+        bgr = None
     if bgr is None:
         raise InputError(f"{file}: not a readable picture.", "Copy it beside the recording again.")
     camera = rig.color
@@ -190,8 +177,8 @@ def write_calibration(
         cv2.imwrite(str(picture_path(recording)), picture[..., ::-1])
     content = {
         "format": _FORMAT,
-        "depth": asdict(rig.depth),
-        "color": asdict(rig.color) if rig.color else None,
+        "depth": rig.depth.document(),
+        "color": rig.color.document() if rig.color else None,
         "color_from_depth": rig.color_from_depth.matrix.tolist() if rig.color_from_depth else None,
         "picture": name,
         "sensor": sensor,
