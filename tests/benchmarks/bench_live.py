@@ -117,7 +117,7 @@ def make_frames(folder: Path) -> Path:
 
 def measure(frames: Path, seconds: float) -> dict[str, float]:
     """Show the frames in a visit page for a while; called in a process of its own."""
-    from PySide6.QtCore import QEventLoop, Qt, QTimer
+    from PySide6.QtCore import QEvent, QEventLoop, Qt, QTimer
     from PySide6.QtWidgets import QApplication
 
     from app.context import AppContext
@@ -188,6 +188,7 @@ def measure(frames: Path, seconds: float) -> dict[str, float]:
         page.deleteLater()
         context.tasks.shut_down()
         QApplication.processEvents()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     return found
 
 
