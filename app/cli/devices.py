@@ -23,18 +23,18 @@ def devices(
     modes: bool = typer.Option(
         False, "--modes", help="Open each connected camera and show its modes and settings as well."
     ),
-    data: Path | None = typer.Option(
-        None, "--data", help="The clinic's folder, whose calibrations are looked at."
+    profiles: Path | None = typer.Option(
+        None, "--profiles", help="Folder of calibration profiles; the workstation's by default."
     ),
 ) -> None:
     """List the cameras, live and simulated. Recordings and folders are opened by their path.
 
     Connected cameras are opened for a moment to ask for serial number, sensor and calibration.
     """
-    from app.paths import calibration_dir, default_data_dir
+    from app.paths import calibration_dir
     from core.calibration.profile import ProfileStore
 
-    store = ProfileStore(calibration_dir(data or default_data_dir()))
+    store = ProfileStore(profiles or calibration_dir())
     found, notes = _find()
     described = [_describe(info, store, details=as_json or modes) for info in found]
     if as_json:

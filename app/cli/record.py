@@ -29,10 +29,12 @@ def record(
     frames: int | None = typer.Option(None, "--frames", min=1, help="End after this many depth frames."),
     burst: int = typer.Option(30, "--burst", min=1, max=300, help="Depth frames in each capture folder."),
     jpeg: bool = typer.Option(False, "--jpeg", help="Compress colour in a .oni file; loses a little."),
-    data: Path | None = typer.Option(None, "--data", help="The clinic's folder, whose calibration is used."),
+    profiles: Path | None = typer.Option(
+        None, "--profiles", help="Folder of calibration profiles; the workstation's by default."
+    ),
 ) -> None:
     """Record until the limit or Ctrl-C; either leaves a complete recording with its calibration beside it."""
-    from app.paths import calibration_dir, default_data_dir
+    from app.paths import calibration_dir
     from core.calibration.profile import ProfileStore
     from core.errors import InputError
     from devices.recordings.recorder import Limits
@@ -45,7 +47,7 @@ def record(
     if out.suffix.lower() != ".oni" and jpeg:
         raise InputError("--jpeg is for .oni files; capture folders keep colour without loss.")
     stop = threading.Event()
-    store = ProfileStore(calibration_dir(data or default_data_dir()))
+    store = ProfileStore(profiles or calibration_dir())
     with _stopping_cleanly(stop), _opened(device, store) as source:
         report = record_frames(
             source, out, Limits(seconds, frames, stop), _Ticker(), burst=burst, lossy_color=jpeg
