@@ -98,6 +98,8 @@ class MainWindow(QMainWindow):
         self.privacy = self._tool("privacy_mode", "eye", "Privacy mode: hide names (Ctrl+Shift+P)")
         self.privacy.setCheckable(True)
         self.privacy.clicked.connect(self.context.set_privacy_mode)
+        self.calibration = self._tool("cameras_calibration", "target", "Cameras and calibration")
+        self.calibration.clicked.connect(self.show_calibration)
         self.about = self._tool("about", "info", "About GeoDerm")
         self.about.clicked.connect(lambda: tell(self, f"About {NAME}", ABOUT))
         self.user = QLabel()
@@ -115,6 +117,7 @@ class MainWindow(QMainWindow):
         row.addStretch(1)
         row.addWidget(self.demo)
         row.addWidget(self.privacy)
+        row.addWidget(self.calibration)
         row.addWidget(self.about)
         row.addSpacing(8)
         row.addWidget(self.user)
@@ -169,6 +172,16 @@ class MainWindow(QMainWindow):
         self._leave_visit()
         self._patients.refresh()  # type: ignore[attr-defined]
         self._show_page(self._patients)
+
+    @Slot()
+    def show_calibration(self) -> None:
+        """Open the calibration wizard; during a visit the camera belongs to the visit."""
+        if self._visit is not None:
+            tell(self, "The visit uses the camera", "Leave the visit first; it can be continued afterwards.")
+            return
+        from app.windows.calibration.wizard import CalibrationWizard
+
+        CalibrationWizard(self, self.context).open()
 
     @Slot()
     def _find_patient(self) -> None:

@@ -154,3 +154,16 @@ def test_about_says_what_it_is_not(small_desk: Desk) -> None:
 
 def test_only_the_demonstration_says_that_it_is_one(small_desk: Desk) -> None:
     assert not small_desk.is_shown("demo_badge")
+
+
+def test_cameras_and_calibration_are_reached_from_the_bar(small_desk: Desk) -> None:
+    desk = small_desk
+    desk.click("cameras_calibration")
+    wizard = desk.find("calibration_wizard")
+    assert wizard.isVisible()
+    QTest.keyClick(wizard, Qt.Key.Key_Escape)
+    desk.wait_until(
+        lambda: not any(w.isVisible() for w in desk.main.findChildren(QWidget, "calibration_wizard")),
+        "the wizard to close",
+        5,
+    )
