@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from pathlib import Path
@@ -37,16 +38,23 @@ def register(app: typer.Typer) -> None:
 
 def board(
     out: Path = typer.Argument(..., help="PDF to write."),
-    paper: str = typer.Option("A4", "--paper", help="A4 or A3; A3 is found from farther away."),
+    paper: str = _PAPER,
 ) -> None:
     """Write the calibration board as a PDF at exact scale."""
     from core.calibration.board_pdf import board_pdf
-    from core.errors import WorkError
+    from core.errors import InputError, WorkError
 
     data = board_pdf(paper)
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: the folder it would be in does not exist.")
     try:
-        out.write_bytes(data)
+        with out.open("xb") as file:
+            file.write(data)
+    except FileExistsError as error:
+        raise InputError(f"{out}: exists already.", "Choose another name.") from error
     except OSError as error:
+        with contextlib.suppress(OSError):
+            out.unlink()
         raise WorkError(
             f"{out}: could not be written ({error.strerror}).", "Choose another place."
         ) from error

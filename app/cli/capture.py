@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +55,7 @@ def capture(
         raise InputError(f"{profiles}: there is no such folder of calibration profiles.")
     from app.paths import calibration_dir
     from app.workflows.analysis import take
-    from core.calibration.profile import ProfileStore
+    from core.calibration.profile import CalibrationProfile, ProfileStore
     from core.surface.scan import scan_body
     from devices.live import LiveCamera
     from devices.registry import open_device
@@ -68,6 +69,9 @@ def capture(
             _wait_until_still(camera, wait_s)
         taken = take(camera, view=view, stance=stance or None, frames=frames, progress=_Shown(as_json))
         pairing = _pairing(camera)
+    if taken.calibration is not None:
+        profile = CalibrationProfile.from_document(taken.calibration, f"{device}: calibration")
+        taken = replace(taken, calibration=profile.document())
     try:
         scan = scan_body(taken)
     except WorkError as error:

@@ -6,8 +6,10 @@ the world is one line on standard error; a bug is logged with its trace and told
 
 from __future__ import annotations
 
+import errno
 import importlib
 import sys
+import warnings
 
 import typer
 from typer import TyperException
@@ -33,6 +35,9 @@ COMMAND_MODULES = (
 )
 """Each has ``register(app)``. Their heavy imports happen inside the commands."""
 
+_WRONG_PATH = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP)
+"""What a path itself is to blame for; anything else is the world's."""
+
 
 def build_app() -> typer.Typer:
     """Typer application with every subcommand."""
@@ -51,6 +56,8 @@ def build_app() -> typer.Typer:
 
 def run(arguments: list[str] | None = None) -> None:
     """Run the command and leave the process with its exit code."""
+    # Numbers of bad input that overflow are found by the checks on the results; one line is told, no more.
+    warnings.simplefilter("ignore", RuntimeWarning)
     sys.exit(main(arguments))
 
 
@@ -72,10 +79,22 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         return 0
-    except Exception:  # noqa: BLE001 - the outermost door: a bug is logged with its trace, never shown as one
-        path = log_bug("command line")
-        sys.stderr.write(f"geoderm: internal error; nothing was changed. Details are in {path}\n")
+    except OSError as error:
+        if error.filename is None:
+            return _bug()
+        sys.stderr.write(f"geoderm: {str(error.filename)[:300]}: {error.strerror or error}\n")
+        if error.errno in _WRONG_PATH:
+            return 2
+        log_bug("command line")
         return 3
+    except Exception:  # noqa: BLE001 - the outermost door: a bug is logged with its trace, never shown as one
+        return _bug()
+
+
+def _bug() -> int:
+    path = log_bug("command line")
+    sys.stderr.write(f"geoderm: internal error; nothing was changed. Details are in {path}\n")
+    return 3
 
 
 def _wrong_use(error: TyperException) -> str:

@@ -21,7 +21,9 @@ def register(app: typer.Typer) -> None:
 
 def play(
     path: Path = typer.Argument(help=".oni file, capture folder, or folder of capture folders."),
-    real_time: bool = typer.Option(False, "--real-time", help="At the pace it was recorded."),
+    real_time: bool = typer.Option(
+        False, "--real-time", help="At the pace it was recorded; pauses above 1 s are shortened."
+    ),
     frames: int | None = typer.Option(None, "--frames", min=1, help="Only the first frames."),
     out: Path | None = typer.Option(None, "--out", help="New folder that gets the frames as captures."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON, with every frame."),
@@ -64,12 +66,14 @@ def play(
 
 
 def _paced(frames: Iterator[LiveFrame]) -> Iterator[LiveFrame]:
-    """The frames at the times they were recorded at."""
-    begun_s = time.monotonic()
-    first_s: float | None = None
+    """The frames at the pace they were recorded at; a pause between two bursts is shortened."""
+    from devices.recordings.played import LONGEST_GAP_S
+
+    due_s, last_s = time.monotonic(), None
     for frame in frames:
-        first_s = frame.time_s if first_s is None else first_s
-        time.sleep(max(frame.time_s - first_s - (time.monotonic() - begun_s), 0.0))
+        gap_s = 0.0 if last_s is None else frame.time_s - last_s
+        due_s, last_s = due_s + min(max(gap_s, 0.0), LONGEST_GAP_S), frame.time_s
+        time.sleep(max(due_s - time.monotonic(), 0.0))
         yield frame
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from core.calibration.camera_document import CameraDocument
 from core.capture.fields import read_bytes
@@ -258,6 +258,15 @@ def _safe(*serials: str) -> str:
     return f"{re.sub(r'[^A-Za-z0-9._+-]', '_', text)[:60]}-{sha256(text.encode()).hexdigest()[:6]}"
 
 
+def _writable(text: str) -> str:
+    """Refuse half characters, which JSON can hold and no file can."""
+    text.encode("utf-8")  # the error is a ValueError
+    return text
+
+
+_Text = Annotated[str, Field(max_length=1000), AfterValidator(_writable)]
+
+
 class _Correction(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
     scale: float = 1.0
@@ -269,13 +278,13 @@ class _Document(BaseModel):
     format: str
     version: int = Field(ge=0)
     made_at: datetime
-    depth_serial: str
-    color_serial: str = ""
+    depth_serial: _Text
+    color_serial: _Text = ""
     depth: CameraDocument
     color: CameraDocument | None = None
-    color_from_depth: list[list[float]] | None = None
+    color_from_depth: list[list[Annotated[float, Field(ge=-100, le=100)]]] | None = None
     depth_correction: _Correction = _Correction()
     sigma: dict[str, float] = {}
     rms_px: dict[str, float] = {}
     views: int = Field(default=0, ge=0)
-    notes: list[str] = []
+    notes: list[_Text] = Field(default=[], max_length=200)

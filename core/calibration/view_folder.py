@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.calibration.board import BoardSpec, detect_board
 from core.calibration.views import RigView, view_of
+from core.capture.fields import read_bytes
 from core.errors import InputError, WorkError
 from core.progress import Progress, no_progress
 
@@ -152,18 +153,17 @@ def read_views(
 def _read_document(folder: Path, square_m: float | None) -> tuple[ViewFolderInfo, list[_Entry]]:
     path = folder / VIEWS_FILE
     try:
-        data = path.read_bytes() if path.stat().st_size <= _LIMIT_BYTES else b""
+        data = read_bytes(path, _LIMIT_BYTES)
+    except InputError as error:
+        raise InputError(error.message, "A folder of views holds a views.json.") from error
+    try:
         document = _Document.model_validate(json.loads(data))
-    except OSError as error:
-        raise InputError(
-            f"{path}: not readable ({error.strerror}).", "A folder of views holds a views.json."
-        ) from error
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: is not JSON.") from error
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"]) or "document"
         raise InputError(f"{path}: {name}: {first['msg']}.") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is not JSON.") from error
     if document.format != VIEWS_FORMAT:
         raise InputError(f"{path}: format: must be {VIEWS_FORMAT}.")
     try:
@@ -206,9 +206,9 @@ def _image(folder: Path, name: str | None, field: str, how: int) -> NDArray[Any]
     if PurePath(name).name != name or not name.lower().endswith((".png", ".jpg", ".jpeg", ".tif", ".tiff")):
         raise InputError(f"{folder / VIEWS_FILE}: {field}: must name a picture in the folder.")
     try:
-        data = path.read_bytes() if path.stat().st_size <= _LIMIT_IMAGE_BYTES else b""
-    except OSError as error:
-        raise InputError(f"{path}: {field} is not readable ({error.strerror}).") from error
+        data = read_bytes(path, _LIMIT_IMAGE_BYTES)
+    except InputError as error:
+        raise InputError(f"{error.message} ({field})") from error
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), how) if data else None
     except cv2.error:

@@ -16,11 +16,11 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.calibration.camera_document import CameraDocument
 from core.calibration.profile import CalibrationProfile
@@ -48,7 +48,7 @@ class _RigFile(BaseModel):
     format: str
     depth: CameraDocument
     color: CameraDocument | None = None
-    color_from_depth: list[list[float]] | None = None
+    color_from_depth: list[list[Annotated[float, Field(ge=-100, le=100)]]] | None = None
     picture: str | None = None
     sensor: str = ""
     nominal: bool = False

@@ -204,7 +204,12 @@ class OniRecording(OpenedByWith):
         self.open()
         assert self._ring is not None
         number = self._runtime.request("step")
-        return None if number is None else self._ring.read(number - 1)
+        if number is None:
+            return None
+        frame = self._ring.read(number - 1)
+        still = None if self._calibration is None else self._calibration.picture
+        # The colour camera of the rig is the one that took the still: the stream's pictures are not its.
+        return frame if still is None or frame is None else replace(frame, rgb=still)
 
     @property
     def _mirrored(self) -> bool:

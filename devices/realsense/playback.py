@@ -35,10 +35,10 @@ class PlaybackSource:
 
     def open(self) -> Mapping[str, Any]:
         """Open the file and read what cameras it was taken with."""
-        self._rs = library.load()
         self._frames: queue.Queue[tuple[str, float, bool, Any]] = queue.Queue(_AHEAD)
-        self._playing: list[Any] = []
+        self._playing: list[Any] = []  # first: `close` comes also after a library that was not found
         self._stopping = False
+        self._rs = library.load()
         self._load()
         facts = self._facts()
         self._play()

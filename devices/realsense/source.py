@@ -41,6 +41,7 @@ class RealSenseSource:
 
     def open(self) -> Mapping[str, Any]:
         """Find the camera and start depth and colour."""
+        self._running: list[Any] = []  # first: `close` comes also after a camera that was not found
         self._rs = library.load()
         self._removed = False
         self._device = self.find_device()
@@ -51,7 +52,6 @@ class RealSenseSource:
         }
         self._chosen = {kind: self._best(kind) for kind in KINDS if self._profiles[kind]}
         self._queue = self._rs.frame_queue(_QUEUE, keep_frames=True)
-        self._running: list[Any] = []
         self._clock = FrameClock()
         self._looked_s = 0.0
         if "depth" not in self._chosen:

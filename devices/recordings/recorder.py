@@ -185,7 +185,7 @@ def _pump(
 ) -> RecordingReport:
     """Carry frames to the target through a bounded queue, so that a slow disk does not stop the camera."""
     waiting: queue.Queue[tuple[LiveFrame, float] | None] = queue.Queue(MAX_WAITING)
-    trouble: list[GeodermError] = []
+    trouble: list[Exception] = []
 
     def write() -> None:
         while (item := waiting.get()) is not None:
@@ -193,10 +193,10 @@ def _pump(
                 continue
             try:
                 target.add(*item)
-            except GeodermError as error:
-                trouble.append(error)
             except OSError as error:
                 trouble.append(unwritable(path, error))
+            except Exception as error:  # noqa: BLE001 - raised by the thread that waits for this one
+                trouble.append(error)
 
     writer = threading.Thread(target=write, name="geoderm-recorder", daemon=True)
     writer.start()
@@ -239,7 +239,7 @@ def _close(
     target: RecordingTarget,
     path: Path,
     told: tuple[float, int, str],
-    trouble: list[GeodermError],
+    trouble: list[Exception],
     failure: BaseException | None,
 ) -> RecordingReport:
     if trouble:

@@ -9,14 +9,17 @@ it, and a single capture folder, play at the nominal rate.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.calibration.profile import CalibrationProfile
 from core.capture import RgbdCapture, read_capture
+from core.capture.fields import read_bytes
 from core.capture.folder import CAPTURE_FILE
 from core.capture.rgbd import CameraRig
 from core.errors import InputError
@@ -28,6 +31,8 @@ SEQUENCE_FILE = "sequence.json"
 SEQUENCE_FORMAT = "geoderm-sequence/1"
 NOMINAL_PERIOD_S = 1 / 30
 _LIMIT_BYTES = 50_000_000
+_LONGEST_S = 1e6
+_LONGEST_NAME = 255
 
 
 @dataclass(frozen=True)
@@ -128,12 +133,17 @@ class FolderSource:
         """What holds for every frame, from the first capture."""
         if self._first is None:
             self._first = read_capture(self._listed[0].path)
-        first = self._first
+        first, file = self._first, self._listed[0].path / CAPTURE_FILE
+        calibration = None
+        if first.calibration is not None:
+            calibration = CalibrationProfile.from_document(
+                first.calibration, f"{file}: calibration"
+            ).document()
         return SourceFacts(
             self._path.name,
             first.rig,
             first.sensor,
-            first.calibration,
+            calibration,
             True,
             first.warnings or ((NOMINAL_WARNING,) if self._nominal() else ()),
             sum(len(listed.times_s) for listed in self._listed),
@@ -145,8 +155,11 @@ class FolderSource:
     def frames(self) -> Iterator[LiveFrame]:
         """The frames of one capture after the other."""
         number, begin_s = 0, 0.0
+        first: RgbdCapture | None = None
         for listed in self._listed:
             capture = read_capture(listed.path)
+            first = first or capture
+            _check_same_cameras(first, capture, listed.path)
             if len(capture.depth_frames) != len(listed.times_s) and listed.times_s:
                 raise InputError(
                     f"{self._path / SEQUENCE_FILE}: times_s: {len(listed.times_s)} times for "
@@ -166,6 +179,23 @@ class FolderSource:
         self._first = None
 
 
+def _check_same_cameras(first: RgbdCapture, capture: RgbdCapture, folder: Path) -> None:
+    """What plays as one recording comes from one rig: sizes and unit stay."""
+    for name, one, other in (
+        ("depth", first.rig.depth, capture.rig.depth),
+        ("color", first.rig.color, capture.rig.color),
+    ):
+        if one is not None and other is not None and (one.width, one.height) != (other.width, other.height):
+            raise InputError(
+                f"{folder / CAPTURE_FILE}: {name}.intrinsics: {other.width} x {other.height} pixels; the "
+                f"first capture has {one.width} x {one.height}."
+            )
+    if (first.rig.color is None) != (capture.rig.color is None):
+        raise InputError(f"{folder / CAPTURE_FILE}: color: one capture has a picture and another has none.")
+    if first.depth_unit_m != capture.depth_unit_m:
+        raise InputError(f"{folder / CAPTURE_FILE}: depth.unit_m: differs from the first capture's.")
+
+
 @dataclass(frozen=True)
 class _Listed:
     path: Path
@@ -177,8 +207,8 @@ class _Listed:
 class _Entry(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
     folder: str
-    times_s: list[float] = Field(min_length=1, max_length=10_000)
-    color_time_s: float | None = None
+    times_s: list[Annotated[float, Field(ge=0, le=_LONGEST_S)]] = Field(min_length=1, max_length=10_000)
+    color_time_s: float | None = Field(default=None, ge=-_LONGEST_S, le=_LONGEST_S)
 
 
 class _Sequence(BaseModel):
@@ -200,22 +230,20 @@ def _read_sequence(path: Path) -> list[_Listed]:
             )
         return [_Listed(folder) for folder in found]
     try:
-        if file.stat().st_size > _LIMIT_BYTES:
-            raise InputError(f"{file}: too large for a sequence.")
-        content = _Sequence.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise InputError(f"{file}: not readable ({error.strerror}).") from error
+        content = _Sequence.model_validate_json(read_bytes(file, _LIMIT_BYTES))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "file"
         raise InputError(f"{file}: {where}: {first['msg']}.") from error
     if content.format != SEQUENCE_FORMAT:
         raise InputError(f"{file}: format: expected {SEQUENCE_FORMAT}.")
-    listed = []
+    listed: list[_Listed] = []
     for i, entry in enumerate(content.captures):
-        if Path(entry.folder).name != entry.folder or entry.folder in ("", ".", ".."):
+        named = Path(entry.folder).name == entry.folder and entry.folder not in ("", ".", "..")
+        if not named or not entry.folder.isprintable() or len(os.fsencode(entry.folder)) > _LONGEST_NAME:
             raise InputError(f"{file}: captures.{i}.folder: must name a folder beside the file.")
-        if sorted(entry.times_s) != entry.times_s:
+        before_s = listed[-1].times_s[-1] if listed else 0.0
+        if sorted(entry.times_s) != entry.times_s or entry.times_s[0] < before_s:
             raise InputError(f"{file}: captures.{i}.times_s: must not go back.")
         listed.append(_Listed(path / entry.folder, tuple(entry.times_s), entry.color_time_s, content.nominal))
     return listed

@@ -135,7 +135,10 @@ class FolderTarget:
         self._waiting: list[tuple[LiveFrame, float]] = []
         self._entries: list[dict[str, Any]] = []
         self.frames = 0
-        path.mkdir()
+        try:
+            path.mkdir()
+        except OSError as error:
+            raise unwritable(path, error) from error
 
     def add(self, frame: LiveFrame, time_s: float) -> None:
         """Keep a frame until its burst is complete."""

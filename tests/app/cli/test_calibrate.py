@@ -49,7 +49,18 @@ def test_the_board_is_written(tmp_path: Path, capfd) -> None:
     assert (tmp_path / "b.pdf").read_bytes().startswith(b"%PDF")
     assert "100 %" in capfd.readouterr().out
     assert main(["calibrate", "board", str(tmp_path / "b.pdf"), "--paper", "A5"]) == 2
-    assert main(["calibrate", "board", str(tmp_path / "no" / "b.pdf")]) == 3
+    assert main(["calibrate", "board", str(tmp_path / "no" / "b.pdf")]) == 2
+
+
+def test_the_board_is_never_written_over_a_file(tmp_path: Path, capfd) -> None:
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    (tmp_path / "dangling.pdf").symlink_to(tmp_path / "nowhere")
+    for out in (mine, tmp_path, tmp_path / "dangling.pdf"):
+        assert main(["calibrate", "board", str(out)]) == 2
+        assert "exists already" in capfd.readouterr().err
+    assert mine.read_text() == "mine"
+    assert not (tmp_path / "nowhere").exists()
 
 
 def test_a_folder_of_views_becomes_a_profile(calibrated, capfd) -> None:
