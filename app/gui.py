@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
+from app.lasting_none import keep_none
 from app.logs import start_logging
 from app.paths import default_data_dir
 from app.windows.start_window import StartWindow
@@ -32,6 +33,7 @@ def application() -> QApplication:
     """The Qt application in the house style."""
     from app.theme import apply_theme
 
+    keep_none()
     existing = QApplication.instance()
     app = existing if isinstance(existing, QApplication) else QApplication(sys.argv[:1])
     app.setApplicationName("GeoDerm")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from app.workflows.analysis import AnalysisCache, NewCapture, Role, TrackerSource, analyse_new
-from app.workflows.joint_correction import anchor_records
+from app.workflows.joint_correction import anchor_records, correct_joints, with_stored_corrections
 from app.workflows.snapshot import VisitSnapshot
 from app.workflows.table import Refused
 from core.capture.rgbd import RgbdCapture
@@ -14,7 +14,7 @@ from core.progress import Progress, ScaledProgress, no_progress
 from core.records import CaptureRecord
 
 if TYPE_CHECKING:
-    from core.anchors import AnalysedCapture, SkeletonCalibration
+    from core.anchors import AnalysedCapture, Skeleton, SkeletonCalibration
     from core.records import ClinicStore
 
 
@@ -83,9 +83,26 @@ class CaptureWork:
         if record.role == "working" and not self.is_ready(capture_id):
             calibration = self._calibration(record.visit_id, ScaledProgress(progress, 0.0, 0.4))
             progress = ScaledProgress(progress, 0.4, 1.0)
-        analysed = self._cache.get(capture_id, calibration=calibration, progress=progress)
+        analysed = self._with_corrections(capture_id, calibration, progress)
         _warm_up_clicks(analysed)
         return analysed
+
+    def correct_joints(
+        self, capture_id: int, skeleton: Skeleton, progress: Progress = no_progress
+    ) -> AnalysedCapture:
+        """A stored capture with joints corrected by hand; its anchors are stored anew."""
+        corrected = correct_joints(self._store, capture_id, self.analysed(capture_id), skeleton, progress)
+        self._cache.put(capture_id, corrected)
+        return corrected
+
+    def _with_corrections(
+        self, capture_id: int, calibration: SkeletonCalibration | None, progress: Progress
+    ) -> AnalysedCapture:
+        found = self._cache.get(capture_id, calibration=calibration, progress=progress)
+        corrected = with_stored_corrections(self._store, capture_id, found)
+        if corrected is not found:
+            self._cache.put(capture_id, corrected)
+        return corrected
 
     def _calibration(self, visit_id: int, progress: Progress) -> SkeletonCalibration | None:
         from core.anchors import calibrate_skeleton
@@ -93,7 +110,7 @@ class CaptureWork:
         stance = self._snapshot().stance_of(visit_id)
         if stance is None:
             return None
-        return calibrate_skeleton(self._cache.get(stance.id, progress=progress).skeleton)
+        return calibrate_skeleton(self._with_corrections(stance.id, None, progress).skeleton)
 
 
 def _warm_up_clicks(analysed: AnalysedCapture) -> None:

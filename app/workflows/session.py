@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from core.anchors import AnalysedCapture
+    from core.anchors import AnalysedCapture, Skeleton
     from core.records import ClinicStore
     from core.relocation.site_check import SiteCheck
 
@@ -227,6 +227,12 @@ class VisitSession:
     def prepare(self, capture_id: int, progress: Progress = no_progress) -> AnalysedCapture:
         """Worker: analyse a stored capture of this or an earlier visit, for example after reopening."""
         return self._captures.prepare(capture_id, progress)
+
+    def correct_joints(
+        self, capture_id: int, skeleton: Skeleton, progress: Progress = no_progress
+    ) -> AnalysedCapture:
+        """Worker: a stored capture with joints corrected by hand; its anchors are stored anew."""
+        return self._captures.correct_joints(capture_id, skeleton, progress)
 
     # -- finding lesions again ---------------------------------------------------------------------
 

@@ -26,6 +26,7 @@ from shiboken6 import isValid
 
 from app.context import AppContext
 from app.demo.driver import WindowDriver
+from app.lasting_none import keep_none
 from app.theme import apply_theme
 from app.widgets.body_backend import body_backend
 from app.windows.main_window import MainWindow
@@ -74,6 +75,7 @@ def _no_screen() -> str:
 @pytest.fixture(scope="session")
 def backend(qapp: QApplication) -> None:
     """The 3D libraries, loaded once, as the application does in the background."""
+    keep_none()
     loader = body_backend()
     loader.load()
     deadline = time.monotonic() + 120

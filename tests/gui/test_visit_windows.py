@@ -372,3 +372,22 @@ def test_the_demonstration_looks_through_the_simulated_camera_at_once(
     context.tasks.shut_down()
     QApplication.processEvents()
     store.close()
+
+
+def test_a_joint_of_a_stored_capture_is_corrected_by_mouse(open_page: Open, world: World) -> None:
+    hands = open_page(follow_up=False)
+    capture_both(hands, world, "A1")
+    session, screen = hands.page.session, hands.page.captures.capture
+    number = session.snapshot.views["front"]
+    hands.click("capture_correct")
+    at = screen.joints.joint_position("left_knee").toPoint()
+    port = screen.photo.viewport()
+    QTest.mousePress(port, Qt.MouseButton.LeftButton, pos=at)
+    for step in (4, 9, 14):
+        QTest.mouseMove(port, at + QPoint(2, step))
+    QTest.mouseRelease(port, Qt.MouseButton.LeftButton, pos=at + QPoint(2, 14))
+    hands.click("capture_correct")
+    hands.wait()
+    assert {a.name: a.source for a in hands.context.store.anchors.list(number)}["left_knee"] == "hand"
+    assert session.analysed(number).skeleton.joints["left_knee"].source == "hand"
+    assert not screen.joints.editing

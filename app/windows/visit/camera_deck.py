@@ -96,8 +96,8 @@ class CameraDeck(QObject):
         return self._calibration
 
     def choices(self) -> list[DeviceInfo]:
-        """Cameras that could be opened now."""
-        return self._context.cameras.list()
+        """Cameras that a patient can stand before now."""
+        return [info for info in self._context.cameras.list() if info.kind != "simulator-board"]
 
     def choose_path(self, path: Path) -> None:
         """Use a capture folder or an .oni recording."""

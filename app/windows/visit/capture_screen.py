@@ -124,7 +124,7 @@ class CaptureScreen(QWidget):
         self.camera_box.setObjectName(f"{self._name}_camera")
         self.camera_box.activated.connect(self._on_camera_chosen)
         self.open_folder = self._tool("Open capture folder", "folder", "open_folder", self._ask_folder)
-        self.open_recording = self._tool("Open .oni recording", "play", "open_recording", self._ask_recording)
+        self.open_recording = self._tool("Open recording", "play", "open_recording", self._ask_recording)
         self.views = QButtonGroup(self)
         self.view_row = QHBoxLayout()
         self.view_row.setSpacing(0)
@@ -369,7 +369,7 @@ class CaptureScreen(QWidget):
 
     @Slot()
     def _ask_recording(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, "Open a recording", "", "OpenNI recordings (*.oni)")
+        path, _ = QFileDialog.getOpenFileName(self, "Open a recording", "", "Recordings (*.oni *.bag *.db3)")
         if path:
             self._deck.choose_path(Path(path))
 

@@ -12,8 +12,9 @@ from app.tasks import TaskFailure
 from app.windows.visit.camera_deck import CameraDeck
 from app.windows.visit.capture_screen import CaptureScreen
 from app.windows.visit.host import VisitHost
+from app.windows.visit.joint_corrections import JointCorrections
 from app.windows.visit.live_assist import LiveAssist
-from app.windows.visit.live_capture import Judged, capture_and_judge, correct_and_judge
+from app.windows.visit.live_capture import Judged, capture_and_judge
 from app.windows.visit.live_ghost import GhostLayer
 from app.windows.visit.live_verdict import verdict_picture
 from app.windows.visit.pictures import joints_picture, stored_picture
@@ -24,7 +25,6 @@ from app.workflows.wording import when
 from core.progress import Progress
 
 if TYPE_CHECKING:
-    from core.anchors import Skeleton
     from core.records import CaptureRecord
 
 _STANCE_STATES = (State.STANCE, State.STANCE_CHECK, State.STANCE_DONE)
@@ -46,7 +46,6 @@ class CaptureSteps(QObject):
         self._pending: Judged | None = None
         self._latest: Judged | None = None
         self._notes: dict[int, Judged] = {}
-        self._corrected: Skeleton | None = None
         self._ghost = GhostLayer(host, self.deck, self)
         self._warned = False
         self.stance.set_stance("psi")
@@ -57,8 +56,9 @@ class CaptureSteps(QObject):
             screen.escaped.connect(self._on_escape)
             screen.controls.automatic_toggled.connect(self._on_automatic)
             screen.controls.ghost_changed.connect(self._ghost.show_opacity)
-            screen.joints.corrected.connect(self._on_joints)
-            screen.joints.editing_changed.connect(self._on_editing)
+        self._joints = JointCorrections(host, (self.stance, self.capture), self._unsaved, self)
+        self._joints.editing_changed.connect(self._editing_changed)
+        self._joints.judged.connect(self._adopt_corrected)
         self.stance.primary_clicked.connect(self._stance_primary)
         self.stance.secondary_clicked.connect(self._stance_secondary)
         self.capture.primary_clicked.connect(self._capture_primary)
@@ -108,7 +108,7 @@ class CaptureSteps(QObject):
             screen.panel.primary.setEnabled(True)
             screen.secondary.setVisible(False)
             screen.live_view.setFocus()
-        elif screen.joints.editing:
+        elif self._joints.editing:
             screen.panel.primary.setEnabled(False)
             screen.secondary.setEnabled(False)
 
@@ -199,6 +199,7 @@ class CaptureSteps(QObject):
                 analysed = session.analysed(record.id)
                 seen, all_joints = len(analysed.skeleton.visible()), len(analysed.skeleton.joints)
                 screen.show_capture(analysed, f"{caption}. {seen} of {all_joints} joints seen.")
+                self._joints.offer(screen, record.id, analysed)
             else:
                 screen.show_plain(stored_picture(session.store, record), caption)
 
@@ -223,33 +224,15 @@ class CaptureSteps(QObject):
 
     # --- joints placed by hand -----------------------------------------------------------------------
 
-    @Slot(object)
-    def _on_joints(self, skeleton: Skeleton) -> None:
-        self._corrected = skeleton
+    def _editing_changed(self) -> None:
+        if not self._joints.editing:
+            self._shown = None  # the capture's own picture again, with the corrected joints in it
+        self.refresh()
 
-    @Slot(bool)
-    def _on_editing(self, on: bool) -> None:
-        """When the correction is done, the capture is judged anew."""
-        screen = self._current
-        if screen is None or on:
-            self._corrected = None
-            self.refresh()
-            return
-        skeleton, self._corrected, self._shown = self._corrected, None, None
-        session = self._host.session
-        pending = self._pending
-        new = session.stance_candidate if pending is None else pending.new
-        if skeleton is None or new is None:
-            self.refresh()
-            return
-        self._host.run(
-            "Placing the anchors",
-            lambda progress: correct_and_judge(new, skeleton, progress),
-            self._on_corrected,
-            stopped=self.refresh,
-        )
+    def _unsaved(self) -> NewCapture | None:
+        return self._host.session.stance_candidate if self._pending is None else self._pending.new
 
-    def _on_corrected(self, judged: Judged) -> None:
+    def _adopt_corrected(self, judged: Judged) -> None:
         self._latest = judged
         if judged.new.good or judged.quality.grade == "refused":
             self._pending = judged

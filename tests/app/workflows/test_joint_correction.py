@@ -66,3 +66,20 @@ def test_a_corrected_stance_is_judged_again(analysed: AnalysedCapture) -> None:
     assert judged.analysed.skeleton.joints["left_knee"].source == "hand"
     assert judged.corrections  # arms a little out are no psi stance
     assert correct_candidate(replace(new, role="working"), analysed.skeleton).corrections == ()
+
+
+def test_a_reopened_visit_has_the_corrected_joints(clinic: Clinic, take: Take) -> None:
+    session = clinic.session()
+    capture_stance(session, take("psi", 1))
+    capture_body(session, take("A", 1))
+    number = session.snapshot.views["front"]
+    corrected = session.correct_joints(number, knee_moved(session.analysed(number)))
+    assert session.analysed(number) is corrected
+
+    again = clinic.session()
+    reopened = again.prepare(number)
+    assert reopened.skeleton.joints["left_knee"].source == "hand"
+    np.testing.assert_allclose(
+        reopened.skeleton.point("left_knee"), corrected.skeleton.point("left_knee"), atol=0.02
+    )
+    assert again.analysed(number) is reopened
