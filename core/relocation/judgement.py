@@ -80,7 +80,7 @@ def judge(
     Parameters
     ----------
     recognition : Recognition
-        Whether person and limbs were recognised.
+        Whether person, limbs and the places of the lesions were recognised.
     fixes : tuple of Fix or None, optional
         What geodesic trilateration says about each lesion; without it the registration stands alone.
     """
@@ -118,7 +118,11 @@ def _judge_one(
     seen = _possible_spots(transfer, row)
     partner = int(transfer.matching.partner[row])
     unfollowed = number in transfer.start.lost
-    lost = _not_found(bone) if unfollowed and bone.parent != 0 else recognition.of_limb(number)
+    lost = (
+        _not_found(bone)
+        if unfollowed and bone.parent != 0
+        else recognition.of_limb(number) or recognition.of_place(row)
+    )
     hidden = _hidden(transfer, row, sight, part)
     believed = (
         not (recognition.doubtful or lost or unfollowed)
