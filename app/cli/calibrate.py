@@ -76,7 +76,7 @@ def run(
     as_json: bool = _JSON,
 ) -> None:
     """Collect views of the board, calibrate, judge, keep the profile. A refused set of views exits with 3."""
-    store = _store(profiles)
+    store = _store(profiles, may_be_new=True)
     if Path(source).is_dir():
         session = _folder_session(Path(source), square_mm, views)
     else:
@@ -167,10 +167,14 @@ def show(
 # ---------------------------------------------------------------- work
 
 
-def _store(profiles: Path | None) -> ProfileStore:
+def _store(profiles: Path | None, *, may_be_new: bool = False) -> ProfileStore:
     from app.paths import calibration_dir
     from core.calibration.profile import ProfileStore
+    from core.errors import InputError
 
+    new = profiles is not None and not profiles.exists() and not profiles.is_symlink()
+    if profiles is not None and not profiles.is_dir() and not (new and may_be_new):
+        raise InputError(f"{profiles}: there is no such folder of calibration profiles.")
     return ProfileStore(profiles or calibration_dir())
 
 

@@ -33,7 +33,10 @@ def devices(
     """
     from app.paths import calibration_dir
     from core.calibration.profile import ProfileStore
+    from core.errors import InputError
 
+    if profiles is not None and not profiles.is_dir():
+        raise InputError(f"{profiles}: there is no such folder of calibration profiles.")
     store = ProfileStore(profiles or calibration_dir())
     found, notes = _find()
     described = [_describe(info, store, details=as_json or modes) for info in found]

@@ -32,8 +32,10 @@ def play(
     from core.errors import InputError, WorkError
     from devices.recordings.sources import open_source
 
-    if out is not None and out.exists():
+    if out is not None and (out.exists() or out.is_symlink()):
         raise InputError(f"{out}: exists already.", "Choose another name.")
+    if out is not None and not out.parent.is_dir():
+        raise InputError(f"{out}: the folder it would be in does not exist.")
     source = open_source(path)
     try:
         facts = source.facts()

@@ -40,13 +40,15 @@ def record(
     from devices.recordings.recorder import Limits
     from devices.recordings.recorder import record as record_frames
 
-    if out.exists():
+    if out.exists() or out.is_symlink():
         raise InputError(f"{out}: exists already.", "Choose another name.")
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder it would be in does not exist.")
     if out.suffix.lower() != ".oni" and jpeg:
         raise InputError("--jpeg is for .oni files; capture folders keep colour without loss.")
     stop = threading.Event()
+    if profiles is not None and not profiles.is_dir():
+        raise InputError(f"{profiles}: there is no such folder of calibration profiles.")
     store = ProfileStore(profiles or calibration_dir())
     with _stopping_cleanly(stop), _opened(device, store) as source:
         report = record_frames(

@@ -156,12 +156,14 @@ class CalibrationProfile:
                     content.depth_correction.scale, content.depth_correction.offset_m
                 ),
                 version=content.version,
-                made_at=content.made_at,
+                made_at=content.made_at.astimezone(UTC),
                 sigma=content.sigma,
                 rms_px=content.rms_px,
                 views=content.views,
                 notes=tuple(content.notes),
             )
+        except OverflowError as error:
+            raise InputError(f"{where}: made_at: is no date.") from error
         except (GeodermError, ValueError) as error:
             raise InputError(f"{where}: {error}") from error
 

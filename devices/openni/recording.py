@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -36,6 +37,9 @@ from devices.openni.session import StartedStreams
 MAX_STREAM_WIDTH = 1600
 """Wider colour frames are not delivered by the runtime when it plays a file (measured: 2048 is too wide)."""
 
+_LONGEST_PATH = 200
+_PLAIN_NAME = "recording.oni"
+
 
 class OniRecording(OpenedByWith):
     """An ``.oni`` file played by the OpenNI2 runtime, frame by frame; none is left out.
@@ -67,7 +71,7 @@ class OniRecording(OpenedByWith):
         self._runtime = RuntimeProcess("recording")
         self._ring: FrameRing | None = None
         self._started: StartedStreams | None = None
-        self._mended: tempfile.TemporaryDirectory[str] | None = None
+        self._beside: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def info(self) -> DeviceInfo:
@@ -137,13 +141,23 @@ class OniRecording(OpenedByWith):
             raise
 
     def _playable(self) -> Path:
-        """The file, or a copy that has what the runtime's player needs and its recorder may leave out."""
-        if self._summary.playable:
+        """The file, or what stands for it where the runtime's player would not take it.
+
+        A copy that has what the player needs and its recorder may leave out; a link to a file whose path has
+        other letters than ASCII, at which the player crashes, or is longer than it can hold.
+        """
+        name = str(self._path)
+        speakable = name.isascii() and len(name) < _LONGEST_PATH
+        if self._summary.playable and speakable:
             return self._path
-        if self._mended is None:
-            self._mended = tempfile.TemporaryDirectory(prefix="geoderm-oni-")
-            mend_oni(self._path, Path(self._mended.name) / "mended.oni")
-        return Path(self._mended.name) / "mended.oni"
+        if self._beside is None:
+            beside = tempfile.TemporaryDirectory(prefix="geoderm-oni-")
+            if self._summary.playable:
+                _link(self._path, Path(beside.name) / _PLAIN_NAME)
+            else:
+                mend_oni(self._path, Path(beside.name) / _PLAIN_NAME)
+            self._beside = beside
+        return Path(self._beside.name) / _PLAIN_NAME
 
     def close(self) -> None:
         """End the process."""
@@ -261,6 +275,19 @@ class OniRecording(OpenedByWith):
             calibration=None if profile is None else profile.document(),
         )
         return unmirror(capture) if capture.mirrored else capture
+
+
+def _link(path: Path, link: Path) -> None:
+    try:
+        try:
+            link.symlink_to(path)
+        except OSError:  # Windows allows links to few people only
+            shutil.copyfile(path, link)
+    except OSError as error:
+        raise WorkError(
+            f"{path}: could not be copied to {link.parent} ({error.strerror}).",
+            "Move the recording to a short path without accented letters, or free space.",
+        ) from error
 
 
 def _unmirrored(frame: LiveFrame) -> LiveFrame:

@@ -32,6 +32,7 @@ MAX_WAITING = 60
 """Frames that may wait for the disk; a newer one is left out then, and counted."""
 
 MIN_FREE_BYTES = 100_000_000
+_DISK_FULL = "disk nearly full"
 _SILENCE_S = 5.0
 _FIRST_FRAME_S = 30.0
 _LEAST_SHARE, _MOST_LEFT_OUT = 0.8, 10
@@ -127,7 +128,7 @@ def record(
         and the message says so.
     """
     for file in (path, calibration_path(path)):
-        if file.exists():
+        if file.exists() or file.is_symlink():
             raise InputError(f"{file}: exists already.", "Choose another name.")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder it would be in does not exist.")
@@ -217,7 +218,7 @@ def _pump(
             left_out += max(frame.number - last_number - 1, 0) if last_number and live else 0
             last_number = frame.number
             if _free_bytes(path) < MIN_FREE_BYTES:
-                ended = "disk nearly full"
+                ended = _DISK_FULL
                 break
             try:
                 waiting.put((frame, elapsed_s), block=not live)
@@ -249,6 +250,11 @@ def _close(
         target.abandon()
         if failure is not None:
             raise failure
+        if told[2] == _DISK_FULL:
+            raise WorkError(
+                f"{path}: nothing was recorded: less than {MIN_FREE_BYTES // 1_000_000} MB are free there.",
+                "Free space, or record to another disk.",
+            )
         raise WorkError(f"{path}: no frame was recorded.", "Check that the camera delivers depth.")
     try:
         target.complete()
@@ -294,7 +300,7 @@ def _record_with_runtime(
                 ended = "done"
                 break
             if _free_bytes(path) < MIN_FREE_BYTES:
-                ended = "disk nearly full"
+                ended = _DISK_FULL
                 break
     except GeodermError as error:
         failure = error

@@ -73,6 +73,25 @@ def test_a_calibration_that_is_none_is_refused_with_its_file(tmp_path: Path) -> 
         open_source(tmp_path / "in").facts()
 
 
+def test_a_day_outside_the_calendar_is_refused() -> None:
+    document = CalibrationProfile(CameraRig(capture_of(64).rig.depth), "D").document()
+    with pytest.raises(InputError, match="made_at"):
+        CalibrationProfile.from_document({**document, "made_at": "0001-01-01T00:00:00+23:59"})
+
+
+def test_a_link_to_nowhere_is_not_replaced_and_a_full_disk_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_capture(capture_of(64), tmp_path / "in")
+    (tmp_path / "link.oni").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InputError, match=r"link.oni: exists already"):
+        record(open_source(tmp_path / "in"), tmp_path / "link.oni", no_limits())
+    monkeypatch.setattr("devices.recordings.recorder._free_bytes", lambda _: 0)
+    with pytest.raises(WorkError, match=r"out.oni: nothing was recorded: less than 100 MB"):
+        record(open_source(tmp_path / "in"), tmp_path / "out.oni", no_limits())
+    assert not (tmp_path / "out.oni").exists()
+
+
 def test_text_that_no_file_can_hold_is_refused() -> None:
     document = CalibrationProfile(CameraRig(capture_of(64).rig.depth), "D").document()
     with pytest.raises(InputError, match="color_serial"):
@@ -105,6 +124,17 @@ def test_a_transform_of_absurd_numbers_is_refused_by_its_field() -> None:
     document["color_from_depth"][0][1] = 1e308
     with pytest.raises(InputError, match=r"color_from_depth\.0\.1"):
         CalibrationProfile.from_document(document)
+
+
+@pytest.mark.parametrize("folder", ["Jörg Müller", "/".join(["long" * 30] * 3)])
+def test_recordings_play_wherever_people_keep_them(tmp_path: Path, folder: str) -> None:
+    """The runtime's player crashes at other letters than ASCII and refuses long paths."""
+    path = tmp_path / folder / "Aufnahme ä.oni"
+    path.parent.mkdir(parents=True)
+    write_oni(capture_of(64), path)
+    source = open_source(path)
+    assert [frame.number for frame in source.frames()] == [1, 2]
+    source.close()
 
 
 def test_frames_of_a_recording_with_a_still_carry_the_still(tmp_path: Path) -> None:

@@ -63,6 +63,14 @@ def test_the_board_is_never_written_over_a_file(tmp_path: Path, capfd) -> None:
     assert not (tmp_path / "nowhere").exists()
 
 
+def test_profiles_are_not_looked_for_in_what_is_no_folder(tmp_path: Path, capfd) -> None:
+    (tmp_path / "file").write_text("")
+    for command in (["list"], ["show", "abc"], ["check", str(tmp_path)], ["run", str(tmp_path)]):
+        assert main(["calibrate", *command, "--profiles", str(tmp_path / "file")]) == 2
+        assert "file: there is no such folder" in capfd.readouterr().err
+    assert main(["calibrate", "list", "--profiles", str(tmp_path / "nowhere")]) == 2
+
+
 def test_a_folder_of_views_becomes_a_profile(calibrated, capfd) -> None:
     code, profiles = calibrated
     assert code == 0
