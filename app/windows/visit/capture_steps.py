@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Slot
 
-from app.live import LiveStatus
-from app.tasks import TaskFailure
 from app.windows.visit.camera_deck import CameraDeck
+from app.windows.visit.camera_news import CameraNews
 from app.windows.visit.capture_screen import CaptureScreen
 from app.windows.visit.host import VisitHost
 from app.windows.visit.joint_corrections import JointCorrections
@@ -47,7 +46,6 @@ class CaptureSteps(QObject):
         self._latest: Judged | None = None
         self._notes: dict[int, Judged] = {}
         self._ghost = GhostLayer(host, self.deck, self)
-        self._warned = False
         self.stance.set_stance("psi")
         self.stance.set_choices_visible(view=False)
         for screen in (self.stance, self.capture):
@@ -64,9 +62,8 @@ class CaptureSteps(QObject):
         self.capture.primary_clicked.connect(self._capture_primary)
         self.capture.secondary_clicked.connect(self._capture_secondary)
         self.deck.changed.connect(self.refresh)
-        self.deck.failed.connect(self._on_camera_failed)
-        self.deck.status_changed.connect(self._on_status)
-        self.deck.came_back.connect(self._on_came_back)
+        self._news = CameraNews(host, self.deck, self)
+        self.deck.status_changed.connect(lambda _: self.refresh())
         self.assist.take.connect(self._take)
         self.assist.phase_changed.connect(self.refresh)
 
@@ -264,30 +261,6 @@ class CaptureSteps(QObject):
             number = self._host.session.snapshot.visit.number
             view = "front" if self._current is self.stance else self._current.view
             self.deck.stand(self._current.stance, view, number)
-
-    @Slot(object)
-    def _on_camera_failed(self, failure: TaskFailure) -> None:
-        self._host.banner.show_error(
-            failure.message, failure.advice or "Choose another camera, capture folder or recording."
-        )
-
-    @Slot(object)
-    def _on_status(self, status: LiveStatus) -> None:
-        if status.kind in ("stalled", "gone"):
-            self._warned = True
-            self._host.banner.show_error(status.message, status.advice)
-        elif status.kind == "streaming" and self._warned:
-            self._on_came_back()
-        elif self._warned and self.deck.camera is None:  # another one was chosen instead
-            self._warned = False
-            self._host.banner.clear()
-        self.refresh()
-
-    @Slot()
-    def _on_came_back(self) -> None:
-        if self._warned:
-            self._warned = False
-            self._host.banner.show_success("The camera is back.", "Everything of the visit is still here.")
 
     @Slot(bool)
     def _on_automatic(self, on: bool) -> None:
