@@ -49,7 +49,9 @@ MOST_OFF_M, MOST_SIGMA_M = 0.006, 0.006
 """A spot counts as seen again only where the skin around it lies on the follow-up's, and matches are near.
 
 On the calibration patients 98 % of right matches keep both, 4 of 5 wrong ones do not. A lesion that the first
-picture does not show as a spot is never "seen again": what should be recognised?"""
+picture does not show as a spot is never "seen again": what should be recognised? Nor is one whose skin was
+carried to face away from the camera: of 2036 spots seen again on calibration and tuning pairs two lay so, one
+right and one 82 mm off."""
 DOUBT, DISBELIEVED = 0.5, 0.3
 """Factors of the confidence where the person is in doubt, and where distances along the skin disagree."""
 FAR_OFF = 1.5
@@ -127,6 +129,7 @@ def _judge_one(
     believed = (
         not (recognition.doubtful or lost or unfollowed)
         and transfer.moles.spot[row] >= 0
+        and sight.cosine[row] > 0.0
         and sight.off_m[row] < MOST_OFF_M
         and transfer.matching.sigma_m[row] < MOST_SIGMA_M
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,3 +143,14 @@ def test_a_spot_seen_again_is_no_answer_where_its_surroundings_are_not(seen_twic
     assert after[row].reason == "not recognised"
     others = [k for k in range(len(before)) if k != row and transfer.moles.twin[k] != row]
     assert [after[k].reason for k in others] == [before[k].reason for k in others]
+
+
+def test_skin_that_faces_away_is_not_seen_again_whatever_spot_lies_there(seen_twice):
+    pair, transfer = seen_twice
+    before = judge(pair, transfer, Recognition(), None)
+    row = next(k for k, estimate in enumerate(before) if estimate.appearance_matched)
+    normals = transfer.normals.copy()
+    normals[row] *= -1.0
+    after = judge(pair, replace(transfer, normals=normals), Recognition(), None)[row]
+    assert not after.appearance_matched
+    assert "turned away" in after.hidden
