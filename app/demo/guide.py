@@ -8,7 +8,8 @@ from pathlib import Path
 from core.errors import WorkError
 
 GUIDE_PICTURES = (
-    "login", "patients", "patient", "stance", "capture", "mark", "review", "follow_up", "explain", "compare",
+    "login", "patients", "patient", "stance_assistant", "stance", "countdown", "capture", "mark", "review",
+    "follow_up", "explain", "compare", "calibration",
 )  # fmt: skip
 _COLORS = 255
 _REPORT_WIDTH = 620

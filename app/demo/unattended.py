@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 DEMO_USER = ("asommer", "Dr Ada Sommer", "demo-clinic-2026")
 CORRECT_FROM_MM = 25.0
+CALIBRATION_VIEWS = 5
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,8 @@ class Tour:
         self._close_visit("follow_up_review")
         self._say("comparison and report")
         self._look_back()
+        self._say("calibrating cameras")
+        self._calibrate()
         return errors
 
     def _say(self, what: str) -> None:
@@ -417,6 +420,28 @@ class Tour:
         if "Nov" in self.window.windowTitle():
             raise DriverError("the window's title names the patient in privacy mode")
         self.hands.click("privacy_mode")
+
+    def _calibrate(self) -> None:
+        """Collect some views of the simulated board, and leave without a calibration."""
+        from app.windows.calibration.wizard import CalibrationWizard
+
+        self.hands.click("cameras_calibration")
+        wizard = self.hands.find("calibration_wizard", CalibrationWizard)
+        start = self.hands.find("calibration_start")
+        self.hands.wait_until(lambda: start.isEnabled(), "the list of cameras", 60)
+        self.hands.click("calibration_start")
+        self.hands.type("board_width", "378")
+        self.hands.click("board_next")
+        page = wizard.collect
+
+        def enough() -> bool:
+            return page.findings is not None and len(page.findings.rows) >= CALIBRATION_VIEWS
+
+        self.hands.wait_until(enough, f"{CALIBRATION_VIEWS} views of the board", WORK_TIMEOUT_S)
+        self.hands.shoot("calibration")
+        self.hands.click("calibration_wizard_close")
+        self.hands.click("sheet_confirm")
+        self.hands.settle(0.5)
 
 
 def _error(number: int, name: str, o: Observation | None, truth: CaptureTruth) -> LesionError:
