@@ -87,8 +87,20 @@ def main(arguments: list[str] | None = None) -> int:
             return 2
         log_bug("command line")
         return 3
-    except Exception:  # noqa: BLE001 - the outermost door: a bug is logged with its trace, never shown as one
+    except Exception as error:  # noqa: BLE001 - the outermost door: a bug is logged with its trace, never shown
+        if _interrupted(error):
+            sys.stderr.write("geoderm: stopped\n")
+            return 130
         return _bug()
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: a library that is being loaded turns it into one of its own."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _bug() -> int:

@@ -66,6 +66,8 @@ def read_picture(path: Path) -> PictureFile:
         If it is cut off, damaged, foreign or too large.
     """
     try:
+        if not path.is_file():  # a pipe would be waited for
+            raise Unusable("not a file")
         if path.stat().st_size > _MOST_BYTES:
             raise Unusable("the file is too large")
         data = path.read_bytes()
@@ -103,7 +105,7 @@ def _exposed_at(details: dict[int, object]) -> float | None:
     base = ExifTags.Base
     date, fraction = details.get(base.DateTimeOriginal), details.get(base.SubsecTimeOriginal)
     digits = str(fraction or "").strip("\0 ")
-    if not isinstance(date, str) or not digits.isdigit():
+    if not isinstance(date, str) or not digits.isdecimal():
         return None
     try:
         moment = datetime.strptime(date.strip("\0 "), "%Y:%m:%d %H:%M:%S").replace(tzinfo=UTC)

@@ -255,6 +255,8 @@ def _close(
                 f"{path}: nothing was recorded: less than {MIN_FREE_BYTES // 1_000_000} MB are free there.",
                 "Free space, or record to another disk.",
             )
+        if told[2] == "stopped":
+            raise WorkError(f"{path}: stopped before the first frame; nothing was recorded.")
         raise WorkError(f"{path}: no frame was recorded.", "Check that the camera delivers depth.")
     try:
         target.complete()

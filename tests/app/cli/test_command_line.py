@@ -53,7 +53,12 @@ def test_an_unknown_command_is_wrong_use() -> None:
 
 @pytest.mark.parametrize(
     ("error", "code"),
-    [(InputError("a.json: lesions: missing.", "Add it."), 2), (WorkError("No body found."), 3)],
+    [
+        (InputError("a.json: lesions: missing.", "Add it."), 2),
+        (WorkError("No body found."), 3),
+        (OSError(36, "File name too long", "abc"), 2),
+        (OSError(28, "No space left on device", "abc"), 3),
+    ],
 )
 def test_an_error_of_the_world_is_one_line_and_its_code(
     error: Exception, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -62,7 +67,21 @@ def test_an_error_of_the_world_is_one_line_and_its_code(
     assert command.main([]) == code
     shown = capsys.readouterr().err
     assert shown.count("\n") == 1
-    assert str(error) in shown
+    if isinstance(error, OSError):
+        assert f"abc: {error.strerror}" in shown
+    else:
+        assert str(error) in shown
+
+
+def test_ctrl_c_behind_the_error_of_a_library_is_no_bug(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A native module that is interrupted while it loads raises ImportError from KeyboardInterrupt."""
+    error = ImportError("initialization failed")
+    error.__cause__ = KeyboardInterrupt()
+    monkeypatch.setattr(command, "build_app", lambda: _failing(error))
+    assert command.main([]) == 130
+    assert capsys.readouterr().err == "geoderm: stopped\n"
 
 
 def test_a_bug_is_logged_with_its_trace_and_told_in_one_line(

@@ -70,6 +70,7 @@ def test_devices_tell_serial_sensor_modes_and_calibration(kinect: FeedFolder, tm
     assert told["calibration"]["version"] == 1
     small = {"kind": "depth", "width": 320, "height": 240, "fps": 30, "pixel_format": "DEPTH_1_MM"}
     assert small in told["modes"]
+    (tmp_path / "elsewhere").mkdir()
     table = geoderm("devices", "--modes", "--profiles", tmp_path / "elsewhere").out
     assert "serial number A00363A01, kinect-v1, not calibrated" in table
     assert "640 x 480 at 30/s" in table

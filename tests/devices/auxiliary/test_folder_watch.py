@@ -212,6 +212,12 @@ def test_a_bad_file_is_refused_with_the_reason(tmp_path: Path, damage: str) -> N
         read_picture(path)
 
 
+def test_a_pipe_in_the_folder_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "x.jpg")
+    with pytest.raises(Unusable, match="not a file"):
+        read_picture(tmp_path / "x.jpg")
+
+
 def test_the_cameras_clock_is_read_to_its_fraction_or_not_at_all(tmp_path: Path) -> None:
     moment = datetime(2026, 11, 22, 10, 15, 30, tzinfo=UTC)
     path = tmp_path / "x.jpg"
