@@ -10,6 +10,7 @@ the three pictures of a view may be missing.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -100,6 +101,10 @@ class ViewFolderWriter:
             partial.write_text(json.dumps(self._document(), indent=1), encoding="utf-8")
             partial.replace(self._folder / VIEWS_FILE)
         except OSError as error:
+            for name in (*entry.values(), f"{VIEWS_FILE}.part"):
+                with contextlib.suppress(OSError):
+                    (self._folder / name).unlink()
+            self._views = [view for view in self._views if view is not entry]
             raise WorkError(
                 f"{self._folder}: the views could not be written ({error.strerror}).",
                 "Check the folder's free space and permissions.",

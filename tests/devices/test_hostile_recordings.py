@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.calibration.board import BoardSpec
 from core.calibration.profile import CalibrationProfile, ProfileStore
-from core.calibration.view_folder import read_views
+from core.calibration.view_folder import ViewFolderInfo, ViewFolderWriter, read_views
 from core.capture import RgbdCapture, read_capture, write_capture
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig
@@ -71,6 +72,24 @@ def test_a_calibration_that_is_none_is_refused_with_its_file(tmp_path: Path) -> 
     file.write_text(json.dumps({**json.loads(file.read_text()), "calibration": {"id": "x"}}))
     with pytest.raises(InputError, match=r"capture.json: calibration: format"):
         open_source(tmp_path / "in").facts()
+
+
+def test_a_view_that_did_not_fit_on_the_disk_leaves_no_half_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer = ViewFolderWriter(tmp_path / "views", ViewFolderInfo("D", "", "", "", BoardSpec.for_paper("A3")))
+    grey = np.zeros((48, 64), np.uint8)
+    writer.add(grey, None, None)
+    before = {p.name: p.read_bytes() for p in (tmp_path / "views").iterdir()}
+
+    def full(path: Path, text: str, **_: object) -> None:
+        path.write_bytes(text[:9].encode())
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(WorkError, match="No space left"):
+        writer.add(grey, None, None)
+    assert {p.name: p.read_bytes() for p in (tmp_path / "views").iterdir()} == before
 
 
 def test_a_day_outside_the_calendar_is_refused() -> None:
