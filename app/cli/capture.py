@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
@@ -97,7 +98,20 @@ def _write(taken: RgbdCapture, out: Path) -> None:
     from core.capture import write_capture
 
     _check_target(out)
-    write_capture(taken, out)
+    try:
+        out.mkdir()  # from here on it is ours: of two captures with one name, one is refused
+    except FileExistsError as error:
+        raise InputError(f"{out}: exists already.", "Choose another name.") from error
+    except OSError as error:
+        raise InputError(
+            f"{out}: the capture cannot be written ({error.strerror}).",
+            "Check the folder's permissions and the free space.",
+        ) from error
+    try:
+        write_capture(taken, out)
+    finally:
+        with contextlib.suppress(OSError):
+            out.rmdir()  # only if it is still empty
 
 
 class _Shown:

@@ -80,6 +80,9 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:
+        if error.filename is None and error.errno == errno.ENOSPC:
+            sys.stderr.write("geoderm: the output could not be written: the disk is full\n")
+            return 3
         if error.filename is None:
             return _bug()
         sys.stderr.write(f"geoderm: {str(error.filename)[:300]}: {error.strerror or error}\n")

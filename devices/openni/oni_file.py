@@ -103,12 +103,17 @@ class OniWriter:
         self._period_us = 1_000_000 // frame_rate
         self._last_timestamp = 0
         try:
-            self._stream: BinaryIO = self._partial.open("wb", buffering=0)
+            self._stream: BinaryIO = self._partial.open("xb", buffering=0)
             try:
                 self._begin()
             except OSError:
                 self.abandon()
                 raise
+        except FileExistsError as error:
+            raise InputError(
+                f"{self._partial}: exists already: a recording that is being made, or was cut off.",
+                "Choose another name.",
+            ) from error
         except OSError as error:
             raise self._failed(error) from error
 

@@ -127,7 +127,7 @@ def record(
         If the camera goes, or the disk is full. What was recorded until then is kept as a complete recording
         and the message says so.
     """
-    for file in (path, calibration_path(path)):
+    for file in (path, calibration_path(path), path.with_name(path.name + ".part")):
         if file.exists() or file.is_symlink():
             raise InputError(f"{file}: exists already.", "Choose another name.")
     if not path.parent.is_dir():

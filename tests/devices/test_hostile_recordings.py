@@ -19,6 +19,7 @@ from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
 from core.errors import InputError, WorkError
 from devices.openni.calibration import calibration_path, read_calibration
+from devices.openni.oni_file import OniWriter
 from devices.openni.recording import write_oni
 from devices.recordings.recorder import Limits, record
 from devices.recordings.sources import SEQUENCE_FILE, open_source
@@ -109,6 +110,18 @@ def test_a_link_to_nowhere_is_not_replaced_and_a_full_disk_is_named(
     with pytest.raises(WorkError, match=r"out.oni: nothing was recorded: less than 100 MB"):
         record(open_source(tmp_path / "in"), tmp_path / "out.oni", no_limits())
     assert not (tmp_path / "out.oni").exists()
+
+
+def test_two_recordings_never_share_a_file(tmp_path: Path) -> None:
+    camera = capture_of(64).rig.depth
+    with OniWriter(tmp_path / "a.oni", camera) as first:
+        first.write(np.full((48, 64), 1500, np.uint16))
+        with pytest.raises(InputError, match=r"a.oni.part: exists already"):
+            OniWriter(tmp_path / "a.oni", camera)
+        write_capture(capture_of(64), tmp_path / "in")
+        with pytest.raises(InputError, match=r"a.oni.part: exists already"):
+            record(open_source(tmp_path / "in"), tmp_path / "a.oni", no_limits())
+    assert open_source(tmp_path / "a.oni").facts().frames == 1
 
 
 def test_text_that_no_file_can_hold_is_refused() -> None:

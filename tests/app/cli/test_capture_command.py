@@ -14,7 +14,9 @@ import pytest
 from app.cli.main import main
 from core.calibration.profile import CalibrationProfile, ProfileStore
 from core.capture import read_capture, write_capture
-from core.capture.rgbd import RgbdCapture
+from core.capture.camera import PinholeCamera
+from core.capture.rgbd import CameraRig, RgbdCapture
+from core.errors import InputError
 from core.progress import Progress, no_progress
 from devices import registry
 from devices.camera import DEFAULT_FRAMES
@@ -208,3 +210,16 @@ def test_a_captured_folder_can_be_captured_again(first: Shot, tmp_path: Path) ->
     np.testing.assert_array_equal(a.color, b.color)
     assert a.rig == b.rig or a.rig.depth == b.rig.depth
     shutil.rmtree(source)
+
+
+def test_a_capture_that_came_first_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two captures with one name at the same time: both found the name free, one may have it."""
+    from app.cli import capture as command
+
+    rig = CameraRig(PinholeCamera(64, 48, 58.0, 58.0, 31.5, 23.5))
+    first, second = (RgbdCapture(np.full((1, 48, 64), d, np.uint16), 0.001, rig) for d in (1500, 1600))
+    command._write(first, tmp_path / "c")
+    monkeypatch.setattr(command, "_check_target", lambda out: None)
+    with pytest.raises(InputError, match="c: exists already"):
+        command._write(second, tmp_path / "c")
+    assert read_capture(tmp_path / "c").depth_frames[0, 0, 0] == 1500

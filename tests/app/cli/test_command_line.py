@@ -73,6 +73,14 @@ def test_an_error_of_the_world_is_one_line_and_its_code(
         assert str(error) in shown
 
 
+def test_output_to_a_full_disk_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "build_app", lambda: _failing(OSError(28, "No space left on device")))
+    assert command.main([]) == 3
+    assert capsys.readouterr().err == "geoderm: the output could not be written: the disk is full\n"
+
+
 def test_ctrl_c_behind_the_error_of_a_library_is_no_bug(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
