@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -99,19 +99,21 @@ def _write(taken: RgbdCapture, out: Path) -> None:
 
     _check_target(out)
     try:
-        out.mkdir()  # from here on it is ours: of two captures with one name, one is refused
-    except FileExistsError as error:
-        raise InputError(f"{out}: exists already.", "Choose another name.") from error
+        with tempfile.TemporaryDirectory(prefix=f".{out.name[:50]}-", dir=out.parent) as staging:
+            staged = Path(staging) / "capture"
+            try:
+                write_capture(taken, staged)
+            except InputError as error:
+                raise InputError(error.message.replace(str(staged), str(out)), error.advice) from error
+            # A folder with something in it is not replaced: of two captures with one name, one is refused.
+            staged.rename(out)
     except OSError as error:
+        if out.exists():
+            raise InputError(f"{out}: exists already.", "Choose another name.") from error
         raise InputError(
-            f"{out}: the capture cannot be written ({error.strerror}).",
+            f"{out}: the capture cannot be written ({error.strerror or error}).",
             "Check the folder's permissions and the free space.",
         ) from error
-    try:
-        write_capture(taken, out)
-    finally:
-        with contextlib.suppress(OSError):
-            out.rmdir()  # only if it is still empty
 
 
 class _Shown:

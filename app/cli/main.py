@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import os
 import sys
 import warnings
 
@@ -58,6 +59,8 @@ def run(arguments: list[str] | None = None) -> None:
     """Run the command and leave the process with its exit code."""
     # Numbers of bad input that overflow are found by the checks on the results; one line is told, no more.
     warnings.simplefilter("ignore", RuntimeWarning)
+    # The same for OpenCV, which tells of a damaged picture in words of its own.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     sys.exit(main(arguments))
 
 
