@@ -103,7 +103,7 @@ class LesionScreen(QWidget):
         self.progress.setObjectName("lesion_progress")
         self.progress.setTextVisible(False)
         self.progress.setFixedHeight(6)
-        self.confirm_all_button = QPushButton(icon("check", palette.SECONDARY), " Confirm all confident")
+        self.confirm_all_button = QPushButton(icon("check", palette.SECONDARY), " Confirm confident")
         self.confirm_all_button.setObjectName("confirm_all")
         self.unseen_button = QPushButton(icon("eye-off", palette.SECONDARY), " Agree: not in view")
         self.unseen_button.setObjectName("accept_unseen")

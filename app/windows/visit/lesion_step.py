@@ -151,7 +151,7 @@ class LesionStep(QObject):
         screen.confirm_all_button.setVisible(follow_up)
         screen.confirm_all_button.setEnabled(confident > 0)
         screen.confirm_all_button.setText(
-            f" Confirm all confident ({confident})" if confident else " Confirm all confident"
+            f" Confirm confident ({confident})" if confident else " Confirm confident"
         )
         screen.confirm_all_button.setToolTip(
             "Confirms every place whose region is no larger than a circle of 20 mm."
