@@ -33,8 +33,9 @@ def simulate(
     joints: bool = typer.Option(False, "--joints", help="Store the simulator's own joints in the capture."),
 ) -> None:
     """Write a capture of a simulated patient. The true places of its lesions go into lesions.json."""
-    if out.exists():
-        raise InputError(f"{out}: exists already.", "Choose another name.")
+    for path in _files_of(out):
+        if path.exists() or path.is_symlink():
+            raise InputError(f"{path}: exists already.", "Choose another name.")
     if not out.parent.is_dir() or not os.access(out.parent, os.W_OK):
         raise InputError(f"{out}: the folder it would be in does not exist or cannot be written.")
     from core.capture import write_capture
@@ -71,3 +72,12 @@ def simulate(
     typer.echo(
         f"{out}: {stance}, {view}, visit {visit}, {frames} depth frames, {len(listed)} lesions in view"
     )
+
+
+def _files_of(out: Path) -> tuple[Path, ...]:
+    """What a simulated capture of this name consists of."""
+    if out.suffix != ".oni":
+        return (out,)
+    from devices.openni.calibration import calibration_path, picture_path
+
+    return out, calibration_path(out), picture_path(out), out.with_suffix(".lesions.json")

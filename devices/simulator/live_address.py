@@ -13,14 +13,30 @@ from devices.simulator.camera_device import SimulatedCamera, SimulatedScene
 from devices.simulator.live_faults import Faults
 from devices.simulator.shapes import SHAPES
 
+
+def _between(kind: Callable[[str], Any], low: float, high: float) -> Callable[[str], Any]:
+    def read(text: str) -> Any:
+        value = kind(text)
+        if not low <= value <= high:  # NaN is outside
+            raise InputError(f"{text} is out of range for a simulated camera.", f"Use {low:g} to {high:g}.")
+        return value
+
+    return read
+
+
 _SCENE: dict[str, Callable[[str], Any]] = {
     "stance": str,
     "view": str,
-    "visit": int,
-    "turn_deg": float,
-    "distance_m": float,
+    "visit": _between(int, 1, 1000),
+    "turn_deg": _between(float, -360, 360),
+    "distance_m": _between(float, 0.5, 8),
 }
-_CAMERA: dict[str, Callable[[str], Any]] = {"seed": int, "sway": str, "light": float, "fault": Faults.parse}
+_CAMERA: dict[str, Callable[[str], Any]] = {
+    "seed": _between(int, 0, 2**31 - 1),
+    "sway": str,
+    "light": _between(float, 0.01, 100),
+    "fault": Faults.parse,
+}
 
 
 class SimulatedCameras:

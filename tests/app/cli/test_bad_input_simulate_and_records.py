@@ -49,6 +49,13 @@ def test_an_earlier_capture_is_never_overwritten(tmp_path: Path) -> None:
     assert [p.name for p in taken.iterdir()] == ["note.txt"]
 
 
+@pytest.mark.parametrize("beside", ["a.oni.calibration.json", "a.oni.picture.png", "a.lesions.json"])
+def test_what_lies_beside_a_recording_is_never_overwritten(tmp_path: Path, beside: str) -> None:
+    (tmp_path / beside).write_text("mine")
+    assert_told(geoderm("simulate", tmp_path / "a.oni"), 2, beside, "exists")
+    assert [p.name for p in tmp_path.iterdir()] == [beside]
+
+
 @pytest.mark.parametrize("name", ["capture", "capture.oni"])
 def test_a_place_below_a_file_cannot_be_written(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").write_text("mine")

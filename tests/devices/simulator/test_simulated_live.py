@@ -16,6 +16,7 @@ from devices.burst import collect_burst
 from devices.live import LiveCamera, LiveFrame, LiveState
 from devices.registry import open_device
 from devices.simulator import SimulatedCamera, SimulatedCapture, SimulatedPatient, SimulatedScene
+from devices.simulator.live_address import SIMULATED_CAMERAS
 from devices.simulator.live_faults import Faults
 from devices.simulator.live_light import LightControl
 from devices.simulator.live_process import DRAWING
@@ -314,3 +315,11 @@ def test_automatic_exposure_reaches_as_far_as_the_frame_rate_lets_it(light: floa
     assert (table is None) == (brightness == 1.0)
     if table is not None:
         assert int(table[100]) < 100
+
+
+@pytest.mark.parametrize(
+    "option", ["distance_m=nan", "distance_m=100", "seed=-1", "seed=99999999999", "visit=0", "light=inf"]
+)
+def test_an_option_out_of_range_is_wrong_use(option: str) -> None:
+    with pytest.raises(InputError, match="out of range"):
+        SIMULATED_CAMERAS.create(f"m_young_avg?{option}")
