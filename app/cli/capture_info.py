@@ -36,10 +36,6 @@ def capture_info(
     analysed = analyse_capture(capture, default_tracker())
     if as_json:
         report = capture_report(analysed)
-        if capture.sensor:
-            report["sensor"] = capture.sensor
-        if calibration is not None:
-            report["calibration"] = calibration.id
         if mirrored_captures(folder, [folder.name]):
             for joint in report["joints"].values():
                 entry_as_stored(joint, capture.rig)
