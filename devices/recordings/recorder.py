@@ -291,6 +291,8 @@ def _record_with_runtime(
     if limits.reached(0, 0.0):
         raise InputError("A recording needs at least one frame.")
     camera.record_oni(str(partial), lossy_color)
+    # The recorder takes its time to begin; what passed until then is not left out of the recording.
+    first = camera.latest(0, 0.0) or first
     begun_s, seen, ended = time.monotonic(), first.number, "stopped"
     failure: GeodermError | None = None
     try:
