@@ -355,8 +355,14 @@ class Session:
         """Complete the recording."""
         if self._recorder is not None:
             recorder, self._recorder = self._recorder, None
+            # The recorder's end and a driver's next frame can wait for each other for ever (seen in 3 of 16
+            # recordings): nothing is delivered while it ends.
+            for opened in self._running.values():
+                opened.stop()
             recorder.stop()
             recorder.close()
+            for opened in self._running.values():
+                opened.start()
 
     def _stop(self) -> None:
         self.stop_recording()

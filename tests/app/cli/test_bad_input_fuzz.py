@@ -14,7 +14,7 @@ from tests.app.cli.cases import Json, assert_told, copy_of, description, geoderm
 from tests.app.cli.conftest import Shot
 
 FUZZ = settings(
-    max_examples=90,
+    max_examples=60,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
