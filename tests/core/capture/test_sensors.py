@@ -71,8 +71,8 @@ def test_noise_is_positive_and_grows_with_distance_and_angle(
 ) -> None:
     sensor = sensor_model(name)
     near = sensor.near_m + z * (sensor.far_m - sensor.near_m)
-    # a time-of-flight camera's noise falls by a fraction of a millimetre over the first metre, and the published
-    # share of the angle falls with distance: it was measured up to 60 degrees
+    # a time-of-flight camera's noise falls by a fraction of a millimetre over the first metre, and the
+    # published share of the angle falls with distance: it was measured up to 60 degrees
     seen = min(angle, np.deg2rad(60))
     assert 0 < sensor.axial_sigma(near, seen) <= sensor.axial_sigma(near + step, seen) + 2.5e-4
     assert sensor.axial_sigma(near, angle) > 0
