@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -129,15 +130,15 @@ def _triangles(path: Path, faces: FloatArray | list[FloatArray]) -> IntArray:
     return triangles
 
 
-class _Body:
+class _Body(ABC):
     """What follows the header, read element by element."""
 
     def __init__(self, path: Path, data: bytes, offset: int) -> None:
         self.path, self.data, self.offset = path, data, offset
 
+    @abstractmethod
     def rows(self, element: _Element) -> tuple[dict[str, FloatArray], FloatArray | list[FloatArray]]:
         """Single-valued columns by name, and the corner lists (an array (m, 3) when all are triangles)."""
-        raise NotImplementedError
 
     def short(self, element: _Element, row: int) -> InputError:
         return InputError(
