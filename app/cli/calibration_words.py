@@ -55,7 +55,7 @@ def result_text(told: dict[str, Any]) -> str:
     used = sum(v["used"] for v in told["views"])
     lines = [f"Verdict        {told['verdict']}, from {used} of {len(told['views'])} views"]
     for name, text, unit in (
-        ("picture_mm", "Picture to skin", "mm"),
+        ("picture_mm", "On the skin", "mm"),
         ("depth_mm", "Distance", "mm"),
         ("length_percent", "Lengths", "%"),
     ):
