@@ -36,8 +36,13 @@ class FoundAnchors:
 class AnchorFinder(Protocol):
     """Finds the anchors of a frame. A new kind of anchor is one more class of this form."""
 
-    kind: AnchorKind
-    count: int
+    @property
+    def kind(self) -> AnchorKind:
+        """Which kind it is."""
+
+    @property
+    def count(self) -> int:
+        """How many anchors it finds, a."""
 
     def find(
         self,
