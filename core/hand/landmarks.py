@@ -13,6 +13,13 @@ FloatArray = NDArray[np.float64]
 LANDMARKS = 21
 """Wrist, then four a finger from its base to its tip, thumb first."""
 
+WRIST = 0
+
+
+def landmark(finger: int, part: int) -> int:
+    """Row of a landmark: finger 0 (thumb) to 4 (little), part 0 (nearest to the wrist) to 3 (tip)."""
+    return 1 + 4 * finger + part
+
 
 @dataclass(frozen=True, eq=False)
 class HandLandmarks:
@@ -27,13 +34,17 @@ class HandLandmarks:
     side : {"L", "R"}
         The person's own.
     score : float
-        0 to 1.
+        0 to 1: how sure the detector is that it is this hand and not the other.
+    shape_m : ndarray (21, 3) or None
+        The hand in space as the detector guesses it, of its usual size and not the measured one: metres, axes
+        of the camera, origin somewhere in the hand.
     """
 
     pixels: FloatArray
     relative_depth: FloatArray
     side: Literal["L", "R"]
     score: float
+    shape_m: FloatArray | None = None
 
 
 class HandDetector(Protocol):

@@ -1,19 +1,13 @@
 """MediaPipe's pose landmarker (Tasks API) as a skeleton tracker.
 
-The library is loaded with the first tracker, not with this module. Two of its habits are unfit for a clinic
-and are switched off here: it writes to standard error from native code, and it reports its use to its maker
-over the network.
+The library is loaded with the first tracker, not with this module.
 """
 
 from __future__ import annotations
 
 import contextlib
-import logging
-import os
-import sys
-import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,15 +16,20 @@ from numpy.typing import NDArray
 
 from core.anchors.names import LANDMARK_NAMES
 from core.anchors.skeleton import PoseLandmarks
-from core.errors import InputError, WorkError
-from resources import resource_path
+from core.errors import WorkError
+from devices.trackers.mediapipe_library import LandmarkerKind, open_landmarker, quiet
 
-_log = logging.getLogger(__name__)
+__all__ = ["MODEL", "MediaPipeTracker", "landmarks_of", "quiet", "start_landmarker"]
 
 MODEL: Final = "pose_landmarker_full.task"
 
-_NO_NETWORK: Final = {"https_proxy": "none://disabled", "http_proxy": "none://disabled", "no_proxy": ""}
-"""A proxy scheme that libcurl refuses before it opens any connection."""
+
+def _create(vision: Any, base: Any, mode: Any) -> Any:
+    options = vision.PoseLandmarkerOptions(base_options=base, running_mode=mode, num_poses=1)
+    return vision.PoseLandmarker.create_from_options(options)
+
+
+_POSE: Final = LandmarkerKind(MODEL, "skeleton tracker", "pose model", _create)
 
 
 class MediaPipeTracker:
@@ -94,58 +93,8 @@ class MediaPipeTracker:
 
 
 def start_landmarker(mode: str, model: Path | None = None) -> tuple[Callable[..., Any], Any, str]:
-    """Load the library and a pose model.
-
-    Parameters
-    ----------
-    mode : {"IMAGE", "VIDEO"}
-        Single pictures, or successive pictures of one person.
-    model : Path, optional
-
-    Returns
-    -------
-    tuple
-        What makes the library's picture of an RGB array, the landmarker, and how to begin the message if it
-        fails with its first picture.
-
-    Raises
-    ------
-    InputError
-        If the model cannot be read.
-    WorkError
-        If the library is missing or refuses to start.
-    """
-    path = resource_path("models", MODEL) if model is None else model
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: the pose model cannot be read ({error.strerror}).") from error
-    said = f"The skeleton tracker could not start with {path.name}"
-    with quiet():
-        _forbid_network()
-        try:
-            import mediapipe
-            from mediapipe.tasks.python import BaseOptions, vision
-        except ImportError as error:
-            raise WorkError(
-                "The skeleton tracker's library (mediapipe) is not installed.", "Run 'make setup' again."
-            ) from error
-        options = vision.PoseLandmarkerOptions(
-            base_options=BaseOptions(model_asset_buffer=data),
-            running_mode=vision.RunningMode[mode],
-            num_poses=1,
-        )
-        try:
-            landmarker = vision.PoseLandmarker.create_from_options(options)
-        except (RuntimeError, ValueError, OSError) as error:
-            raise WorkError(f"{said}: {error}") from error
-
-    def picture(rgb: NDArray[np.uint8]) -> Any:
-        if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
-            raise ValueError("a tracker needs an RGB picture of 8 bits")
-        return mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(rgb))
-
-    return picture, landmarker, said
+    """Load the library and a pose model; see `devices.trackers.mediapipe_library.open_landmarker`."""
+    return open_landmarker(_POSE, mode, model)
 
 
 def landmarks_of(found: Any, width: int, height: int) -> PoseLandmarks | None:
@@ -158,34 +107,3 @@ def landmarks_of(found: Any, width: int, height: int) -> PoseLandmarks | None:
     # normalised 0..1 runs over pixel edges; pixel centres are at integer coordinates here
     pixels = np.array([(p.x * width - 0.5, p.y * height - 0.5) for p in points])
     return PoseLandmarks(pixels, np.array([float(p.visibility or 0.0) for p in points]))
-
-
-def _forbid_network() -> None:
-    """Keep the library's usage reports in this computer.
-
-    The native library posts statistics through its own libcurl and offers no switch. `os.putenv` changes the
-    C environment that libcurl reads and leaves `os.environ` alone, so that Python code is not affected.
-    """
-    for name, value in _NO_NETWORK.items():
-        os.putenv(name, value)
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Send what native code writes to standard error to the log (level debug) instead."""
-    try:
-        sys.stderr.flush()
-        kept = os.dup(2)
-    except (OSError, AttributeError):  # a windowed program may have no standard error at all
-        yield
-        return
-    with tempfile.TemporaryFile() as sink:
-        os.dup2(sink.fileno(), 2)
-        try:
-            yield
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-            sink.seek(0)
-            for line in sink.read().decode("utf-8", "replace").splitlines():
-                _log.debug("%s", line)
