@@ -1,11 +1,11 @@
-"""The four corners of an ArUco marker on the back of the hand: found, lifted to 3D, put on the skin."""
+"""ArUco markers in a picture of a hand: found, their corners located, the number read also on bent skin."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -13,11 +13,23 @@ from numpy.typing import NDArray
 
 from core.capture.rgbd import CameraRig
 from core.errors import InputError
+from core.hand.marker_edges import Outline, trace_outline
 
 FloatArray = NDArray[np.float64]
+GrayImage = NDArray[np.uint8]
+
+Effort = Literal["quick", "thorough"]
 
 DEFAULT_DICTIONARY = "DICT_4X4_50"
+
 _SIZE_TOLERANCE = 0.2
+_RIM_SHARE = 6.0 / 8.0
+"""Black square against white rim and all: sometimes the rim's outline is what is found."""
+
+_LEAST_SIDE_PX = 12.0
+_MOST_CANDIDATES = 16
+_OTHERS = ("4X4_250", "5X5_1000", "6X6_1000", "7X7_1000", "ARUCO_ORIGINAL")
+_FAMILY_SIZES = (50, 100, 250, 1000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +58,10 @@ def dictionaries() -> tuple[str, ...]:
 
 
 def find_markers(
-    rgb: NDArray[np.uint8], dictionary: str = DEFAULT_DICTIONARY, near_px: FloatArray | None = None
+    rgb: NDArray[np.uint8],
+    dictionary: str = DEFAULT_DICTIONARY,
+    near_px: FloatArray | None = None,
+    effort: Effort = "thorough",
 ) -> list[SeenMarker]:
     """Markers in a picture (h, w, 3), the largest first.
 
@@ -57,54 +72,140 @@ def find_markers(
         One of `dictionaries`.
     near_px : ndarray (4,), optional
         Only look inside this box (left, top, right, bottom).
+    effort : {"quick", "thorough"}
+        Quick looks with one threshold window; thorough with six, if the first found nothing.
 
     Raises
     ------
     InputError
         If there is no such dictionary.
     """
+    _dictionary(dictionary)
     left = top = 0
-    gray = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
     if near_px is not None:
         left, top = (max(int(x), 0) for x in near_px[:2])
-        gray = gray[top : int(near_px[3]) + 1, left : int(near_px[2]) + 1]
-        if min(gray.shape) < 16:
+        rgb = rgb[top : max(int(near_px[3]) + 1, 0), left : max(int(near_px[2]) + 1, 0)]
+        if min(rgb.shape[:2]) < _LEAST_SIDE_PX:
             return []
-    corners, numbers, _ = _detector(dictionary).detectMarkers(np.ascontiguousarray(gray))
-    if numbers is None:
-        return []
-    found = [
-        SeenMarker(int(number), np.asarray(square, float).reshape(4, 2) + np.array([left, top]))
-        for number, square in zip(np.ravel(numbers), corners, strict=True)
-    ]
-    return sorted(found, key=lambda marker: -marker.side_px)
+    gray = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY))
+    found = _search(gray, dictionary, thorough=False, all_of_them=near_px is None)
+    if not found and effort == "thorough":
+        found = _search(gray, dictionary, thorough=True, all_of_them=True)
+    moved = [SeenMarker(m.number, m.corners_px + np.array([left, top])) for m in found]
+    return sorted(moved, key=lambda marker: -marker.side_px)
 
 
-@lru_cache(maxsize=4)
-def _detector(dictionary: str) -> Any:
-    if dictionary not in dictionaries():
+def _search(gray: GrayImage, dictionary: str, *, thorough: bool, all_of_them: bool) -> list[SeenMarker]:
+    """Markers; squares that ArUco could not read are read on the bent patch, ``all_of_them`` or if needed."""
+    corners, numbers, rejected = _detector(dictionary, thorough).detectMarkers(gray)
+    found: list[SeenMarker] = []
+    for square, number in zip(corners, () if numbers is None else np.ravel(numbers), strict=True):
+        given = np.asarray(square, float).reshape(4, 2)
+        outline = trace_outline(gray, given)
+        found.append(SeenMarker(int(number), given if outline is None else outline.corners_px))
+    if found and not all_of_them:
+        return found
+    for outline in _outlines(gray, rejected):
+        seen = _read(gray, outline, dictionary)
+        if seen is not None and not any(_same_place(seen, other) for other in found):
+            found.append(seen)
+    return found
+
+
+@lru_cache(maxsize=8)
+def _dictionary(name: str) -> Any:
+    if name not in dictionaries():
         raise InputError(
-            f"There is no ArUco dictionary '{dictionary}'.", "Use one such as DICT_4X4_50 or DICT_5X5_100."
+            f"There is no ArUco dictionary '{name}'.", "Use one such as DICT_4X4_50 or DICT_5X5_100."
         )
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+@lru_cache(maxsize=8)
+def _detector(dictionary: str, thorough: bool) -> Any:
     parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.cornerRefinementWinSize = 4
-    known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
-    return cv2.aruco.ArucoDetector(known, parameters)
+    # the corners are located afterwards, along the whole sides
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    windows = (3, 53, 10) if thorough else (15, 15, 10)
+    parameters.adaptiveThreshWinSizeMin, parameters.adaptiveThreshWinSizeMax = windows[:2]
+    parameters.adaptiveThreshWinSizeStep = windows[2]
+    parameters.polygonalApproxAccuracyRate = 0.05
+    parameters.minMarkerPerimeterRate = 0.02
+    parameters.errorCorrectionRate = 1.0
+    return cv2.aruco.ArucoDetector(_dictionary(dictionary), parameters)
+
+
+def _outlines(gray: GrayImage, squares: Sequence[Any]) -> list[Outline]:
+    """Sides of the squares seen but not read: black within white all around, whatever is in them."""
+    given = [np.asarray(square, float).reshape(4, 2) for square in squares]
+    sides = [np.linalg.norm(c - np.roll(c, 1, axis=0), axis=1) for c in given]
+    large = [c for c, side in zip(given, sides, strict=True) if side.min() >= _LEAST_SIDE_PX]
+    large.sort(key=lambda c: -float(cv2.contourArea(c.astype(np.float32))))
+    traced = []
+    for square in large[:_MOST_CANDIDATES]:
+        middle = square.mean(axis=0)
+        for corners in (square, middle + _RIM_SHARE * (square - middle)):
+            outline = trace_outline(gray, corners)
+            if outline is not None:
+                traced.append(outline)
+                break
+    return traced
+
+
+def _read(gray: GrayImage, outline: Outline, dictionary: str, *, correct: bool = True) -> SeenMarker | None:
+    """The marker within an outline, its cells looked for on the bent patch that the sides span."""
+    known = _dictionary(dictionary)
+    cells = known.markerSize + 2
+    u, v = np.meshgrid((np.arange(3 * cells) + 0.5) / (3 * cells), (np.arange(3 * cells) + 0.5) / (3 * cells))
+    places = outline.places(u.ravel(), v.ravel()).astype(np.float32).reshape(3 * cells, 3 * cells, 2)
+    shade = cv2.remap(gray, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+    # the middle ninth of a cell counts most: its rim is blurred with its neighbours
+    level = shade.reshape(cells, 3, cells, 3).transpose(0, 2, 1, 3).reshape(cells, cells, 9) @ _CELL_WEIGHTS
+    half = 0.5 * (np.percentile(level, 10) + np.percentile(level, 95))
+    white = level > half
+    if white[[0, -1]].any() or white[:, [0, -1]].any():
+        return None
+    bits = np.ascontiguousarray(white[1:-1, 1:-1].astype(np.uint8))
+    same, number, turns = known.identify(bits, 1.0 if correct else 0.0)
+    if not same:
+        return None
+    return SeenMarker(int(number), np.roll(outline.corners_px, int(turns), axis=0))
+
+
+_CELL_WEIGHTS = np.array([1.0, 2.0, 1.0, 2.0, 4.0, 2.0, 1.0, 2.0, 1.0]) / 16.0
+
+
+def _same_place(one: SeenMarker, other: SeenMarker) -> bool:
+    apart = one.corners_px.mean(axis=0) - other.corners_px.mean(axis=0)
+    return float(np.hypot(*apart)) < 0.5 * max(one.side_px, other.side_px)
 
 
 def other_dictionary(rgb: NDArray[np.uint8], dictionary: str) -> str | None:
-    """A dictionary of which there is a marker although ``dictionary`` has none here; for the message."""
-    for name in ("DICT_4X4_50", "DICT_5X5_50", "DICT_6X6_50", "DICT_7X7_50", "DICT_ARUCO_ORIGINAL"):
-        if name != dictionary and find_markers(rgb, name):
-            return name
+    """A dictionary of which there is a marker although ``dictionary`` has none here; for the message.
+
+    The squares are looked for once and read as markers of every size. The smallest dictionary of the family
+    that holds the number is named. Without correction of single bits, for a name that is wrong helps nobody.
+    """
+    gray = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY))
+    corners, _, rejected = _detector(dictionary, True).detectMarkers(gray)
+    for outline in _outlines(gray, [*corners, *rejected]):
+        for family in _OTHERS:
+            seen = _read(gray, outline, f"DICT_{family}", correct=False)
+            if seen is None:
+                continue
+            size = family.split("_")[0]
+            name = f"DICT_{family}"
+            if family != "ARUCO_ORIGINAL":
+                name = next(f"DICT_{size}_{n}" for n in _FAMILY_SIZES if seen.number < n)
+            if name != dictionary:
+                return name
     return None
 
 
 def marker_pose(marker: SeenMarker, rig: CameraRig, side_m: float) -> FloatArray:
     """Corners (4, 3) in the depth camera's frame from the marker's known size alone (its four rays).
 
-    Used where to look on the skin; the skin itself then gives the distance.
+    For a marker at which there is no depth; elsewhere the skin itself tells the distance.
     """
     camera = rig.picture_camera
     h = 0.5 * side_m
@@ -117,10 +218,15 @@ def marker_pose(marker: SeenMarker, rig: CameraRig, side_m: float) -> FloatArray
     return rig.picture_from_depth.inverse().apply(corners)
 
 
+def measured_side_m(corners_m: FloatArray) -> float:
+    """Median side of corners (4, 3)."""
+    sides = np.sort(np.linalg.norm(corners_m - np.roll(corners_m, 1, axis=0), axis=1))
+    return float(0.5 * (sides[1] + sides[2]))
+
+
 def size_fault(corners_m: FloatArray, side_m: float) -> str | None:
     """A sentence if corners (4, 3) lifted to the skin are those of a marker of another size."""
-    sides = np.linalg.norm(corners_m - np.roll(corners_m, 1, axis=0), axis=1)
-    measured = float(np.median(sides))
+    measured = measured_side_m(corners_m)
     if abs(measured / side_m - 1.0) <= _SIZE_TOLERANCE:
         return None
     return (
