@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import import_module
 from typing import Any
 
@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 _NAIL = 0.8
 """Share of the last phalanx at which a tip lies."""
 
-_BONES = ("finger", "metacarpal", "wrist", "lowerarm")
+_BONES = ("finger", "metacarpal", "wrist", "lowerarm", "upperarm")
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ CONFIGURATIONS: dict[str, dict[str, FingerAngles]] = {
     "fist": _fingers(_ACROSS, index=_BENT, middle=_BENT, ring=_BENT, little=_BENT),
     "point": _fingers(_ACROSS, middle=_BENT, ring=_BENT, little=_BENT),
     "two": _fingers(_ACROSS, ring=_BENT, little=_BENT),
-    "grip": _fingers(FingerAngles(20.0, 25.0, 20.0), index=_ROUND, middle=_ROUND, ring=_ROUND, little=_ROUND),
+    "grip": _fingers(FingerAngles(57.0, 10.0, 15.0), index=_ROUND, middle=_ROUND, ring=_ROUND, little=_ROUND),
     "pinch": _fingers(
         FingerAngles(30.0, 25.0, 25.0),
         index=FingerAngles(52.0, 48.0, 28.0),
@@ -73,14 +73,14 @@ CONFIGURATIONS: dict[str, dict[str, FingerAngles]] = {
 
 @dataclass(frozen=True, eq=False)
 class HandModel:
-    """Hand and forearm of one body shape; never changed after making.
+    """Hand and arm of one body shape; never changed after making.
 
     Attributes
     ----------
     body : BodyModel
     side : {"R", "L"}
     rows : ndarray (n,)
-        Vertices of the body model that belong to hand and forearm.
+        Vertices of the body model that belong to hand, forearm and upper arm, which goes straight on.
     triangles : ndarray (m, 3) int32
         Of those rows.
     reference : ndarray (n, 3)
@@ -117,7 +117,11 @@ class HandModel:
                 if joint == 1 and angles.spread:
                     turn = rotation_about(axes.spread(number), np.deg2rad(angles.spread)) @ turn
                 local[f"finger{number}-{joint}.{self.side}"] = turn
-        return _in_hand_frame(self.body, self.side, local)[self.rows]
+        return self._skinning.posed(local)
+
+    @cached_property
+    def _skinning(self) -> _Skinning:
+        return _Skinning.of(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,18 +171,85 @@ class _Axes:
         return -self.out_of_back if self.side == "L" else self.out_of_back
 
 
-def _in_hand_frame(body: BodyModel, side: str, local: dict[str, FloatArray]) -> FloatArray:
-    """All body vertices with these bone rotations, in the hand frame (no bone above the fingers turns)."""
+@dataclass(frozen=True, eq=False)
+class _Skinning:
+    """Linear blend skinning of `pose_body` for fingers that bend alone: a hundred times faster.
+
+    Attributes
+    ----------
+    bones : list of (name, parent's number or -1, origin (3,), vertices (k,), weights (k,), places (k, 3))
+        The finger bones, parents first. ``places`` is where the bone alone would put the vertices of the
+        outstretched hand, against its origin.
+    still : ndarray (n, 3)
+        What all other bones contribute.
+    rotation, origin : ndarray (3, 3), (3,)
+        Of the hand frame in the body frame.
+    """
+
+    bones: list[tuple[str, int, FloatArray, NDArray[np.int64], FloatArray, FloatArray]]
+    still: FloatArray
+    rotation: FloatArray
+    origin: FloatArray
+
+    @classmethod
+    def of(cls, model: HandModel) -> _Skinning:
+        body, rows = model.body, model.rows
+        names = [f"finger{n}-{k}.{model.side}" for n in range(1, 6) for k in (1, 2, 3)]
+        bind = np.column_stack([body.bind[rows], np.ones(len(rows))])
+        still = np.zeros((len(rows), 3))
+        bones = []
+        for k, name in enumerate(body.bones):
+            weight = (body.weights[rows] * (body.weight_bones[rows] == k)).sum(axis=1)
+            touched = np.flatnonzero(weight)
+            if len(touched) == 0:
+                continue
+            frame = np.eye(4)
+            frame[:3, :3], frame[:3, 3] = body.bone_rotation[k], body.bone_origin[k]
+            places = (bind[touched] @ (frame @ body.skin_from_bind[k]).T)[:, :3]
+            if name not in names:
+                still[touched] += weight[touched, None] * places
+                continue
+            joint = int(name[name.index("-") + 1])
+            above = names.index(name) - 1 if joint > 1 else -1
+            origin = body.bone_origin[k]
+            bones.append((name, above, origin, touched, weight[touched], places - origin))
+        bones.sort(key=lambda bone: names.index(bone[0]))
+        rotation, origin = _hand_frame(body, model.side)
+        return cls(bones, still, rotation, origin)
+
+    def posed(self, local: Mapping[str, FloatArray]) -> FloatArray:
+        """Vertices (n, 3) in the hand frame with these bone rotations."""
+        vertices = self.still.copy()
+        turns: list[FloatArray] = []
+        moved: list[FloatArray] = []
+        for name, above, origin, rows, weights, places in self.bones:
+            turn, place = local[name], origin
+            if above >= 0:
+                place = moved[above] + turns[above] @ (origin - self.bones[above][2])
+                turn = turns[above] @ turn
+            turns.append(turn)
+            moved.append(place)
+            vertices[rows] += weights[:, None] * (places @ turn.T + place)
+        return np.asarray((vertices - self.origin) @ self.rotation.T)
+
+
+def _hand_frame(body: BodyModel, side: str) -> tuple[FloatArray, FloatArray]:
+    """Axes (3, 3), one a row, and origin (3,) of the hand frame in the body frame."""
     axes = _Axes.of(body, side)
-    posed = pose_body(body, local)
-    # `pose_body` stands the body on the floor: what the hand does not move tells the shift
-    still = int(np.argmin(body.bone_weight("finger")))
-    vertices = posed.vertices - posed.vertices[still] + body.reference[still]
     middle = 0.5 * (body.bone_point(f"wrist.{side}") + body.bone_point(f"finger3-1.{side}"))
     y = axes.along - axes.out_of_back * (axes.along @ axes.out_of_back)
     y /= np.linalg.norm(y)
     z = axes.out_of_back
-    rotation = np.stack([np.cross(y, z), y, z])
+    return np.stack([np.cross(y, z), y, z]), middle
+
+
+def _in_hand_frame(body: BodyModel, side: str, local: dict[str, FloatArray]) -> FloatArray:
+    """All body vertices with these bone rotations, in the hand frame (no bone above the fingers turns)."""
+    posed = pose_body(body, local)
+    # `pose_body` stands the body on the floor: what the hand does not move tells the shift
+    still = int(np.argmin(body.bone_weight("finger")))
+    vertices = posed.vertices - posed.vertices[still] + body.reference[still]
+    rotation, middle = _hand_frame(body, side)
     return np.asarray((vertices - middle) @ rotation.T)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from core.capture.camera import PinholeCamera
 from core.capture.rgbd import CameraRig, RgbdCapture
 from core.capture.transform import RigidTransform
+from core.hand.labels import FrameLabels
 from core.hand.names import POINT_NAMES
 from devices.simulator.body import vertex_normals
 from devices.simulator.hands.model import HandModel
@@ -25,7 +26,6 @@ from devices.simulator.skin import TONES, linear
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-_MARKER_CELLS = 6
 _QUIET_CELLS = 1
 _HIDDEN_SLACK_M = 0.004
 _STEEP_COSINE = 0.2
@@ -62,7 +62,7 @@ class MarkerSheet:
         turned = (xy - self.shift_m) @ np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
         picture = _marker_picture(self.dictionary, self.number)
         cells = len(picture)
-        scale = _MARKER_CELLS / self.side_m
+        scale = (cells - 2 * _QUIET_CELLS) / self.side_m
         column = np.floor(turned[:, 0] * scale + cells / 2).astype(np.int64)
         row = np.floor(-turned[:, 1] * scale + cells / 2).astype(np.int64)
         inside = (column >= 0) & (row >= 0) & (column < cells) & (row < cells)
@@ -114,18 +114,19 @@ class HandView:
         Distance of the background; 0 for none.
     tone : int
         Row of `devices.simulator.skin.TONES`.
-    blur_px : float
-        Motion blur of the colour picture.
+    blur_px, blur_turn_rad : float
+        Motion blur of the colour picture: its length, and its direction from x toward y.
     """
 
     model: HandModel
     vertices: FloatArray
     depth_from_hand: RigidTransform
-    markers: Sequence[MarkerSheet] = (MarkerSheet(),)
-    things: Sequence[Thing] = ()
+    markers: tuple[MarkerSheet, ...] = (MarkerSheet(),)
+    things: tuple[Thing, ...] = ()
     wall_m: float = 1.4
     tone: int = 1
     blur_px: float = 0.0
+    blur_turn_rad: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,12 +142,25 @@ class HandFrame:
         Whether the depth camera sees the point.
     corners_m : ndarray (k, 4, 3)
         Of the markers, on the skin.
+    configuration : str or None
+        What the hand does; None between two configurations.
+    time_s : float
+        Of a sequence.
+    remark : str
+        What happens in this frame of a sequence, in words; empty in most.
     """
 
     capture: RgbdCapture
     points_m: dict[str, FloatArray]
     visible: dict[str, bool]
     corners_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4, 3)))
+    configuration: str | None = None
+    time_s: float = 0.0
+    remark: str = ""
+
+    def labels(self) -> FrameLabels:
+        """The truth as somebody would label the frame."""
+        return FrameLabels(self.configuration, self.points_m, self.visible)
 
 
 class _Scene:
@@ -275,10 +289,23 @@ def _picture(
         picture = cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     picture = cv2.GaussianBlur(picture, (0, 0), 0.7)
     if view.blur_px > 1:
-        length = max(2, round(view.blur_px))
-        picture = cv2.blur(picture, (length, max(1, length // 3)))
+        picture = cv2.filter2D(picture, -1, _streak(view.blur_px, view.blur_turn_rad))
     picture = picture + rng.normal(0.0, 0.012, picture.shape).astype(np.float32)
     return np.asarray(np.clip(255.0 * picture, 0, 255).astype(np.uint8))
+
+
+def _streak(length_px: float, turn_rad: float) -> Image:
+    """Kernel of a motion of this length and direction."""
+    half = int(np.ceil(0.5 * length_px)) + 1
+    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+    way = np.linspace(-0.5, 0.5, 8 * half + 1) * length_px
+    u, v = half + way * np.cos(turn_rad), half + way * np.sin(turn_rad)
+    u0, v0 = np.floor(u).astype(int), np.floor(v).astype(int)
+    for du in (0, 1):
+        for dv in (0, 1):
+            weight = np.abs(1 - du - (u - u0)) * np.abs(1 - dv - (v - v0))
+            np.add.at(kernel, (v0 + dv, u0 + du), weight.astype(np.float32))
+    return np.asarray(kernel / kernel.sum())
 
 
 _LAMP = np.array([-0.4, -0.75, -0.53])

@@ -58,12 +58,15 @@ class Holder:
         Of skin tone and of the marker's place: up to 4 mm and 6 degrees off, never twice the same.
     marker_m : float
         Side of the marker; 0 for a hand without one.
+    dictionary : str
+        Of the marker, name in cv2.aruco.
     """
 
     shape: str = "m_young_avg"
     side: str = "R"
     seed: int = 0
     marker_m: float = 0.036
+    dictionary: str = "DICT_4X4_50"
 
     def sheet(self) -> tuple[MarkerSheet, ...]:
         """The marker as it was stuck on."""
@@ -75,7 +78,10 @@ class Holder:
         size = load_hand(self.shape, self.side).length_m / load_hand("m_young_avg", self.side).length_m
         return (
             MarkerSheet(
-                self.marker_m, turn_deg=turn, shift_m=(float(shift[0]) * size, float(shift[1]) * size)
+                self.marker_m,
+                dictionary=self.dictionary,
+                turn_deg=turn,
+                shift_m=(float(shift[0]) * size, float(shift[1]) * size),
             ),
         )
 
@@ -151,4 +157,5 @@ def shoot(
     rng = np.random.default_rng((0x5407, seed, holder.seed))
     view = hand_view(holder, configuration, rng, variation)
     view = replace(view, blur_px=blur_px, things=things)
-    return take_frame(view, rig or make_rig((640, 480), device_seed=holder.seed), rng)
+    frame = take_frame(view, rig or make_rig((640, 480), device_seed=holder.seed), rng)
+    return replace(frame, configuration=configuration)
