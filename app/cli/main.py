@@ -33,6 +33,7 @@ COMMAND_MODULES = (
     "app.cli.record",
     "app.cli.play",
     "app.cli.capture",
+    "app.cli.hand",
 )
 """Each has ``register(app)``. Their heavy imports happen inside the commands."""
 

@@ -1,0 +1,341 @@
+"""From labelled frames to a model of the hand: measured, learned, cross-validated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.capture.rgbd import RgbdCapture
+from core.errors import GeodermError, InputError, WorkError
+from core.hand.anchors import AnchorFinder
+from core.hand.fields import HandFields, measure_fields
+from core.hand.hand_model import DEFAULT_MARKER_M, HandModel
+from core.hand.labels import FrameLabels
+from core.hand.marker import DEFAULT_DICTIONARY
+from core.hand.model import LEAST_FRAMES, OWN_FIELDS, LabelledFrame, learn_configuration
+from core.hand.names import PAIRS, POINT_NAMES
+from core.hand.stills import still_depth
+from core.hand.surface import cut_hand
+from core.hand.tree import ConfigurationTree, learn_tree
+from core.progress import Cancelled, Progress, no_progress
+from core.surface.body_surface import BodySurface
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+STEP_PX = 2
+"""Every so many depth pixels become a vertex: as the tracker does it, so that both measure alike."""
+
+OFF_HAND_M = 0.010
+"""A point labelled farther from the measured skin does not lie on it."""
+
+FOLDS = 5
+FEW_FRAMES = 10
+"""Of a configuration: with fewer, the accuracy found by cross-validation is a rough guess."""
+
+_FAULTY_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFrame:
+    """A labelled frame's distances, and which of its points could not be measured.
+
+    Attributes
+    ----------
+    frame : LabelledFrame
+    left_out : tuple of str
+        Sentences such as "index_tip is labelled 40 mm off the hand."
+    """
+
+    frame: LabelledFrame
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """What the tree says of frames it was not grown from (cross-validation).
+
+    Attributes
+    ----------
+    classes : tuple of str
+    counts : ndarray (c, c) int64
+        Frames; rows the true configuration, columns what was said.
+    folds : int
+    """
+
+    classes: tuple[str, ...]
+    counts: NDArray[np.int64]
+    folds: int
+
+    @property
+    def accuracy(self) -> float:
+        """Share of the frames whose configuration was said rightly."""
+        return float(np.trace(self.counts) / self.counts.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What was learned, and from what.
+
+    Attributes
+    ----------
+    model : HandModel
+    used : dict of str to int
+        Frames by configuration.
+    left_out : tuple of (str, str)
+        Frames that teach nothing, with the reason.
+    points_left_out : tuple of (str, str)
+        Frames of which some points do not count, with a sentence for each such point.
+    confusion : Confusion or None
+        None with a single configuration.
+    remarks : tuple of str
+        What makes the lesson less sure than usual; sentences for people.
+    """
+
+    model: HandModel
+    used: Mapping[str, int]
+    left_out: tuple[tuple[str, str], ...] = ()
+    points_left_out: tuple[tuple[str, str], ...] = ()
+    confusion: Confusion | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def accuracy(self) -> float | None:
+        """By cross-validation; None with a single configuration."""
+        return None if self.confusion is None else self.confusion.accuracy
+
+
+def measure_frame(capture: RgbdCapture, labels: FrameLabels, finder: AnchorFinder) -> LabelledFrame:
+    """Distances between the labelled points and from the anchors along the skin of one frame.
+
+    Raises
+    ------
+    InputError, WorkError
+        With what is wrong with the frame: no labels, no marker, points off the hand.
+    """
+    return measure_labelled(capture, labels, finder).frame
+
+
+def measure_labelled(capture: RgbdCapture, labels: FrameLabels, finder: AnchorFinder) -> MeasuredFrame:
+    """As `measure_frame`, with the points that had to be left out."""
+    if labels.configuration is None:
+        raise InputError("It has no configuration.", "Name one.")
+    points = labels.array()
+    labelled = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if len(labelled) == 0:
+        raise InputError("No visible point is labelled.")
+    depth_m = still_depth(capture)
+    anchors = finder.find(capture.color, depth_m, capture.rig)
+    if not anchors.seen:
+        raise WorkError(anchors.reason or "No anchors were found.")
+    there = np.isfinite(anchors.places_m).all(axis=1)
+    if not there.any():
+        raise WorkError(anchors.reason or "No anchors were found.")
+    hand = cut_hand(depth_m, capture.rig.depth, anchors.places_m[there], step_px=STEP_PX)
+    labelled, faults = _on_skin(points, labelled, hand.surface)
+    fields = measure_fields(hand, anchors.places_m)
+    frame, lost = _distances(labels.configuration, fields, points, labelled)
+    if len(lost) == len(labelled):
+        raise WorkError("No labelled point hangs together with the anchors along the skin.")
+    apart = "lies on skin that does not hang together with the anchors."
+    return MeasuredFrame(frame, (*faults, *(f"{POINT_NAMES[p]} {apart}" for p in lost)))
+
+
+def _on_skin(points: FloatArray, labelled: IntArray, surface: BodySurface) -> tuple[IntArray, list[str]]:
+    """Which of the labelled points (15, 3) lie on the skin, and what is wrong with the others."""
+    off_m = np.linalg.norm(points[labelled] - surface.nearest_arrays(points[labelled])[2], axis=1)
+    off = off_m > OFF_HAND_M
+    if np.mean(off) > _FAULTY_SHARE:
+        worst = int(np.argmax(off_m))
+        raise InputError(
+            f"{int(off.sum())} of {len(labelled)} points are labelled off the hand "
+            f"({POINT_NAMES[labelled[worst]]} by {1000 * off_m[worst]:.0f} mm)."
+        )
+    said = [
+        f"{POINT_NAMES[p]} is labelled {1000 * d:.0f} mm off the hand."
+        for p, d in zip(labelled[off], off_m[off], strict=True)
+    ]
+    return labelled[~off], said
+
+
+def _distances(
+    name: str, fields: HandFields, points: FloatArray, labelled: IntArray
+) -> tuple[LabelledFrame, IntArray]:
+    """Distances of the labelled points, and which of them no anchor can be reached from."""
+    surface, count = fields.surface, len(POINT_NAMES)
+    values = fields.at(points[labelled])
+    reached = np.isfinite(values[:, :-OWN_FIELDS]).any(axis=1)
+    lost, labelled, values = labelled[~reached], labelled[reached], values[reached]
+    anchor_m = np.full((count, values.shape[1]), np.nan)
+    anchor_m[labelled] = np.where(np.isfinite(values), values, np.nan)
+    between = np.full((count, count), np.nan)
+    if len(labelled):
+        triangles, weights, _ = surface.nearest_arrays(points[labelled])
+        from_each = fields.solver.distances(surface.nearest(points[labelled]))
+        there = np.einsum("skc,kc->sk", from_each[:, surface.triangles[triangles]], weights)
+        # measured both ways: the mean has less of the noise
+        mean = 0.5 * (there + there.T)
+        between[np.ix_(labelled, labelled)] = np.where(np.isfinite(mean), mean, np.nan)
+    return LabelledFrame(name, anchor_m, np.array([between[i, j] for i, j in PAIRS])), lost
+
+
+def learn_hand(
+    frames: Iterable[tuple[str, RgbdCapture, FrameLabels]],
+    finder: AnchorFinder,
+    *,
+    dictionary: str = DEFAULT_DICTIONARY,
+    marker_m: float = DEFAULT_MARKER_M,
+    count: int | None = None,
+    progress: Progress = no_progress,
+) -> Lesson:
+    """Learn a hand's configurations from labelled frames.
+
+    A frame that cannot teach is left out with its reason. A configuration needs `model.LEAST_FRAMES` frames.
+
+    Parameters
+    ----------
+    frames : iterable of (name, RgbdCapture, FrameLabels)
+        Read one after the other, so that they need not fit into memory.
+    finder : AnchorFinder
+    dictionary : str
+    marker_m : float
+    count : int, optional
+        How many frames there are, for the progress; taken from ``frames`` if it knows.
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        If no configuration has enough frames; says why frames were left out.
+    Cancelled
+    """
+    total = count if count is not None else (len(frames) if isinstance(frames, Sequence) else 0)
+    collected = _Collected()
+    for number, (name, capture, labels) in enumerate(frames):
+        progress(0.9 * min(number / total, 1.0) if total else 0.0, f"Measuring {name}")
+        collected.add(name, capture, labels, finder)
+    progress(0.9, "Learning distances")
+    by_name = collected.enough()
+    used = [frame for frames_of_one in by_name.values() for frame in frames_of_one]
+    rigid = finder.kind == "marker"
+    models = {
+        name: learn_configuration(name, of_one, rigid_anchors=rigid) for name, of_one in by_name.items()
+    }
+    progress(0.93, "Growing the decision tree")
+    several = len(models) > 1
+    model = HandModel(models, grow_tree(used) if several else None, finder.kind, marker_m, dictionary)
+    confusion = cross_validate(used, progress) if several else None
+    progress(1.0, "Learned")
+    return Lesson(
+        model,
+        {name: len(of_one) for name, of_one in by_name.items()},
+        tuple(collected.left_out),
+        tuple(collected.points_left_out),
+        confusion,
+        _remarks(by_name),
+    )
+
+
+@dataclass
+class _Collected:
+    """Frames as they are measured."""
+
+    frames: list[tuple[str, LabelledFrame]] = field(default_factory=list)
+    left_out: list[tuple[str, str]] = field(default_factory=list)
+    points_left_out: list[tuple[str, str]] = field(default_factory=list)
+
+    def add(self, name: str, capture: RgbdCapture, labels: FrameLabels, finder: AnchorFinder) -> None:
+        if labels.configuration is None and not labels.points_m:
+            self.left_out.append((name, "It has no labels."))
+            return
+        try:
+            measured = measure_labelled(capture, labels, finder)
+        except Cancelled:
+            raise
+        except GeodermError as error:
+            self.left_out.append((name, str(error)))
+            return
+        self.frames.append((name, measured.frame))
+        self.points_left_out += [(name, fault) for fault in measured.left_out]
+
+    def enough(self) -> dict[str, list[LabelledFrame]]:
+        """Frames by configuration, of those that have enough."""
+        by_name: dict[str, list[LabelledFrame]] = {}
+        for _, frame in self.frames:
+            by_name.setdefault(frame.configuration, []).append(frame)
+        few = {name: len(of_one) for name, of_one in by_name.items() if len(of_one) < LEAST_FRAMES}
+        if len(few) == len(by_name):
+            raise InputError(self._too_few(by_name), self._first_reason())
+        for name, frame in self.frames:
+            kind = frame.configuration
+            if kind in few:
+                said = f"Configuration '{kind}' has {few[kind]} of the {LEAST_FRAMES} frames it needs."
+                self.left_out.append((name, said))
+        return {name: by_name[name] for name in sorted(by_name) if name not in few}
+
+    def _too_few(self, by_name: Mapping[str, Sequence[LabelledFrame]]) -> str:
+        if not self.frames and not self.left_out:
+            return "There are no frames to learn from."
+        if not by_name:
+            return f"None of the {len(self.left_out)} frames teaches anything."
+        most = max(by_name, key=lambda name: len(by_name[name]))
+        had = len(by_name[most])
+        return (
+            f"No configuration has the {LEAST_FRAMES} frames it needs: of '{most}' there "
+            f"{'is 1' if had == 1 else f'are {had}'} that can be used. One frame shows no spread."
+        )
+
+    def _first_reason(self) -> str:
+        if not self.left_out:
+            return "Label more frames."
+        name, reason = self.left_out[0]
+        others = len(self.left_out) - 1
+        more = "" if others == 0 else f" ({others} more left out)"
+        return f"{name}: {reason}{more}"
+
+
+def grow_tree(frames: Sequence[LabelledFrame]) -> ConfigurationTree:
+    """The decision tree of frames of at least two configurations: what it learns from is decided here."""
+    return learn_tree(np.array([frame.pair_m for frame in frames]), [frame.configuration for frame in frames])
+
+
+def cross_validate(frames: Sequence[LabelledFrame], progress: Progress = no_progress) -> Confusion:
+    """Grow the tree again and again without some frames, and ask it about those.
+
+    Folds take whole stretches of every configuration's frames, in their order, and never shuffle:
+    neighbouring frames of a recording are nearly the same, and one in training would answer for the other.
+
+    Parameters
+    ----------
+    frames : sequence of LabelledFrame
+        Of at least two configurations, at least two frames of each.
+    """
+    from sklearn.model_selection import StratifiedKFold
+
+    names = np.array([frame.configuration for frame in frames])
+    classes, numbers = np.unique(names, return_inverse=True)
+    folds = int(min(FOLDS, np.bincount(numbers).min()))
+    counts = np.zeros((len(classes), len(classes)), np.int64)
+    splits = StratifiedKFold(folds).split(np.zeros(len(frames)), numbers)
+    for fold, (grown_from, asked) in enumerate(splits):
+        progress(0.93 + 0.07 * fold / folds, "Cross-validating the decision tree")
+        tree = grow_tree([frames[k] for k in grown_from])
+        for k in asked:
+            said = tree.classes[int(np.argmax(tree.likelihood(frames[k].pair_m)))]
+            counts[numbers[k], list(classes).index(said)] += 1
+    return Confusion(tuple(map(str, classes)), counts, folds)
+
+
+def _remarks(by_name: Mapping[str, Sequence[LabelledFrame]]) -> tuple[str, ...]:
+    said = []
+    few = [f"'{name}' ({len(of_one)})" for name, of_one in by_name.items() if len(of_one) < FEW_FRAMES]
+    if few:
+        said.append(
+            f"Few frames of {', '.join(few)}: spreads and accuracy are rough. {FEW_FRAMES} are better."
+        )
+    if len(by_name) == 1:
+        said.append("A single configuration: there is nothing to tell apart, and no decision tree.")
+    return tuple(said)
