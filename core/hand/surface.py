@@ -9,20 +9,23 @@ from numpy.typing import NDArray
 
 from core.capture.camera import PinholeCamera
 from core.errors import WorkError
+from core.hand.segmentation import REACH_M, HandPart, part_of_hand
 from core.surface.body_surface import BodySurface
-from core.surface.denoise import denoise_depth
+
+__all__ = ["REACH_M", "HandSurface", "cut_hand", "mesh_part"]
 
 FloatArray = NDArray[np.float64]
 
-REACH_M = 0.26
-"""How far from the marker a hand can reach: wrist to fingertip of a large hand."""
+SPACING_M = 0.0022
+"""Between vertices, if nothing else is asked for: some 3000 vertices on a hand."""
 
 JUMP_M = 0.012
-"""Neighbouring pixels of one skin differ by less (fingers before the palm differ by more)."""
+"""A triangle's corners differ by less in depth, at 2 mm between them; in proportion otherwise."""
 
-_SMOOTH_PX = 1.5
+_SMOOTH_M = 0.0022
+_SMOOTH_PX = (1.2, 2.6)
 _GATE_M = 0.010
-_MARGIN_PX = 8
+_SMALLEST_PART = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +40,18 @@ class HandSurface:
         Upper left pixel (u, v) of the crop in the depth image.
     step_px : int
         Every so many pixels became a vertex.
+    touching : str or None
+        A sentence if the hand lies against something large, which then is part of the surface.
     """
 
     surface: BodySurface
     corner_px: tuple[int, int]
     step_px: int
+    touching: str | None = None
 
 
 def cut_hand(
-    depth_m: FloatArray, camera: PinholeCamera, seed_m: FloatArray, *, step_px: int = 1
+    depth_m: FloatArray, camera: PinholeCamera, seed_m: FloatArray, *, step_px: int | None = None
 ) -> HandSurface:
     """Skin connected to a place on the hand.
 
@@ -55,61 +61,57 @@ def cut_hand(
         Metres, 0 for no measurement.
     camera : PinholeCamera
     seed_m : ndarray (k, 3)
-        Places on the back of the hand, for example the marker's corners; depth frame.
+        Places on the back of the hand, for example the marker's corners; depth frame. NaN rows do not count.
+    step_px : int, optional
+        Pixels between vertices; by default what comes nearest to `SPACING_M`.
 
     Raises
     ------
     WorkError
         If there is no surface at these places.
     """
-    centre = seed_m.mean(axis=0)
-    u0, v0, u1, v1 = _window(camera, centre)
-    crop = np.ascontiguousarray(depth_m[v0:v1, u0:u1])
-    cropped = replace(camera, width=u1 - u0, height=v1 - v0, cx=camera.cx - u0, cy=camera.cy - v0)
-    part = _connected(crop, cropped, seed_m)
-    smooth = denoise_depth(np.where(part, crop, 0.0), sigma_px=_SMOOTH_PX, gate_m=_GATE_M)
-    points = cropped.backproject(smooth)
-    smooth[((points - centre) ** 2).sum(axis=2) > REACH_M**2] = 0.0
-    if step_px > 1:
-        smooth = np.ascontiguousarray(smooth[::step_px, ::step_px])
-        cropped = PinholeCamera(
-            smooth.shape[1],
-            smooth.shape[0],
-            cropped.fx / step_px,
-            cropped.fy / step_px,
-            cropped.cx / step_px,
-            cropped.cy / step_px,
-            cropped.distortion,
-        )
-    surface = BodySurface.from_depth(smooth, cropped, jump_m=JUMP_M * step_px, smallest_part=200)
-    return HandSurface(surface, (u0, v0), step_px)
+    return mesh_part(part_of_hand(depth_m, camera, seed_m), step_px)
 
 
-def _window(camera: PinholeCamera, centre: FloatArray) -> tuple[int, int, int, int]:
-    middle = camera.project(centre)[0]
-    if not np.isfinite(middle).all():
-        raise WorkError("The hand is behind the camera.")
-    reach = REACH_M / max(float(centre[2]) - 0.1, 0.15) * np.array([camera.fx, camera.fy]) + _MARGIN_PX
-    low = np.clip(np.floor(middle - reach), 0, (camera.width - 1, camera.height - 1)).astype(int)
-    high = np.clip(np.ceil(middle + reach), low + 1, (camera.width, camera.height)).astype(int)
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+def mesh_part(part: HandPart, step_px: int | None = None) -> HandSurface:
+    """Smooth the pixels of a hand where there will be vertices, and join these to triangles."""
+    from core.hand.surface_kernels import smooth_grid
 
-
-def _connected(depth: FloatArray, camera: PinholeCamera, seed_m: FloatArray) -> NDArray[np.bool_]:
-    """Pixels of the part that most of the seeds lie on."""
-    from core.surface.depth_kernels import label_components
-
-    jump = np.full(depth.shape, JUMP_M)
-    labels, _ = label_components(depth, jump)
-    pixels = np.rint(camera.project(seed_m)).astype(np.int64)
-    found = []
-    for (u, v), place in zip(pixels, seed_m, strict=True):
-        near = (slice(max(v - 2, 0), v + 3), slice(max(u - 2, 0), u + 3))
-        close = (labels[near] >= 0) & (np.abs(depth[near] - place[2]) < 2 * JUMP_M) & (depth[near] > 0)
-        found += list(labels[near][close])
-    if not found:
+    camera = part.camera
+    pixel_m = float(part.centre_m[2]) / camera.fx
+    step = step_px if step_px is not None else max(1, round(SPACING_M / pixel_m))
+    rows, columns = np.flatnonzero(part.mask.any(axis=1)), np.flatnonzero(part.mask.any(axis=0))
+    box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    sigma = float(np.clip(_SMOOTH_M / pixel_m, *_SMOOTH_PX))
+    depth = smooth_grid(
+        np.ascontiguousarray(part.depth_m[box]),
+        np.ascontiguousarray(part.mask[box]),
+        step,
+        0,
+        _gaussian(sigma),
+        _GATE_M,
+    )
+    thinned = replace(
+        camera,
+        width=depth.shape[1],
+        height=depth.shape[0],
+        fx=camera.fx / step,
+        fy=camera.fy / step,
+        cx=(camera.cx - box[1].start) / step,
+        cy=(camera.cy - box[0].start) / step,
+    )
+    jump = JUMP_M * max(1.0, step * pixel_m / 0.002)
+    try:
+        surface = BodySurface.from_depth(depth, thinned, jump_m=jump, smallest_part=_SMALLEST_PART)
+    except WorkError as error:
         raise WorkError(
-            "There is no measured skin at the marker.", "Hold the hand 0.5 to 1 m from the camera."
-        )
-    values, counts = np.unique(found, return_counts=True)
-    return np.asarray(labels == values[np.argmax(counts)])
+            "Too little of the hand is measured.", "Hold the hand 0.5 to 1 m from the camera, not edge on."
+        ) from error
+    corner = part.corner_px[0] + box[1].start, part.corner_px[1] + box[0].start
+    return HandSurface(surface, corner, step, part.touching)
+
+
+def _gaussian(sigma_px: float) -> NDArray[np.float32]:
+    radius = max(1, int(np.ceil(2.2 * sigma_px)))
+    steps = np.arange(-radius, radius + 1) ** 2
+    return np.exp(-(steps[:, None] + steps[None]) / (2.0 * sigma_px**2)).astype(np.float32)
