@@ -297,18 +297,24 @@ def _skin_points(
         if number == 3:
             middle_nail = nail
     start = np.array(inside) + 0.04 * np.array(outward)
-    found = _cast(reference, triangles, start, -np.array(outward))
-    hit = found["primitive_ids"].numpy().astype(np.int64)
-    uv = found["primitive_uvs"].numpy().astype(float)
-    if not np.isfinite(found["t_hit"].numpy()).all():
+    triangle, weights = skin_below(reference, triangles, start, -np.array(outward))
+    if not np.isfinite(weights).all():
         raise RuntimeError("a joint of the hand has no skin over it")
-    return hit, np.column_stack([1.0 - uv.sum(axis=1), uv]), middle_nail
+    return triangle, weights, middle_nail
 
 
-def _cast(vertices: FloatArray, triangles: NDArray[np.int32], start: FloatArray, along: FloatArray) -> Any:
+def skin_below(
+    vertices: FloatArray, triangles: NDArray[np.int32], start: FloatArray, along: FloatArray
+) -> tuple[NDArray[np.int64], FloatArray]:
+    """Triangle (k,) and weights (k, 3) of the first skin that rays meet; NaN weights where there is none."""
     o3d: Any = import_module("open3d")
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(
         o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(triangles.astype(np.uint32))
     )
-    return scene.cast_rays(o3d.core.Tensor(np.column_stack([start, along]).astype(np.float32)))
+    found = scene.cast_rays(o3d.core.Tensor(np.column_stack([start, along]).astype(np.float32)))
+    met = np.isfinite(found["t_hit"].numpy())
+    uv = found["primitive_uvs"].numpy().astype(float)
+    weights = np.column_stack([1.0 - uv.sum(axis=1), uv])
+    triangle = np.where(met, found["primitive_ids"].numpy().astype(np.int64), 0)
+    return triangle, np.where(met[:, None], weights, np.nan)
