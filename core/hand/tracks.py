@@ -85,6 +85,8 @@ def tracked_frame(name: str, answer: HandAnswer) -> TrackedFrame:
     points: dict[str, TrackedPoint | None] = {}
     for k, point in enumerate(POINT_NAMES):
         points[point] = _point(answer, k) if told[k] else None
+    # a folder's name may hold bytes that are no text
+    name = name.encode("utf-8", "replace").decode("utf-8")
     return TrackedFrame(name, answer.configuration, bool(answer.marker_seen), answer.reason, points)
 
 
