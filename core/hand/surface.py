@@ -22,9 +22,9 @@ SPACING_M = 0.0022
 JUMP_M = 0.012
 """A triangle's corners differ by less in depth, at 2 mm between them; in proportion otherwise."""
 
-_SMOOTH_M = 0.0022
-_SMOOTH_PX = (1.2, 2.6)
-_GATE_M = 0.010
+_SMOOTH_M = 0.0025
+_SMOOTH_PX = (1.2, 2.8)
+_GATE_M = 0.012
 _SMALLEST_PART = 100
 
 
@@ -80,14 +80,12 @@ def mesh_part(part: HandPart, step_px: int | None = None) -> HandSurface:
     camera = part.camera
     pixel_m = float(part.centre_m[2]) / camera.fx
     step = step_px if step_px is not None else max(1, round(SPACING_M / pixel_m))
-    rows, columns = np.flatnonzero(part.mask.any(axis=1)), np.flatnonzero(part.mask.any(axis=0))
-    box = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
     sigma = float(np.clip(_SMOOTH_M / pixel_m, *_SMOOTH_PX))
     depth = smooth_grid(
-        np.ascontiguousarray(part.depth_m[box]),
-        np.ascontiguousarray(part.mask[box]),
+        part.depth_m,
+        part.median_m,
+        part.mask,
         step,
-        0,
         _gaussian(sigma),
         _GATE_M,
     )
@@ -97,8 +95,8 @@ def mesh_part(part: HandPart, step_px: int | None = None) -> HandSurface:
         height=depth.shape[0],
         fx=camera.fx / step,
         fy=camera.fy / step,
-        cx=(camera.cx - box[1].start) / step,
-        cy=(camera.cy - box[0].start) / step,
+        cx=camera.cx / step,
+        cy=camera.cy / step,
     )
     jump = JUMP_M * max(1.0, step * pixel_m / 0.002)
     try:
@@ -107,8 +105,7 @@ def mesh_part(part: HandPart, step_px: int | None = None) -> HandSurface:
         raise WorkError(
             "Too little of the hand is measured.", "Hold the hand 0.5 to 1 m from the camera, not edge on."
         ) from error
-    corner = part.corner_px[0] + box[1].start, part.corner_px[1] + box[0].start
-    return HandSurface(surface, corner, step, part.touching)
+    return HandSurface(surface, part.corner_px, step, part.touching)
 
 
 def _gaussian(sigma_px: float) -> NDArray[np.float32]:
