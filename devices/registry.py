@@ -102,6 +102,7 @@ def open_device(device_id: str, profiles: ProfileStore | None = None) -> DepthCa
 
 register_camera("simulator", "devices.simulator.live_address:SIMULATED_CAMERAS")
 register_camera("simulator-board", "devices.simulator.board_device:BOARD_CAMERAS")
+register_camera("simulator-hand", "devices.simulator.hand_device:SIMULATED_HANDS")
 register_camera("openni", "devices.openni.cameras:CONNECTED_CAMERAS")
 register_camera("recording", "devices.recordings.cameras:RECORDINGS")
 register_camera("folder", "devices.folders:FOLDERS")

@@ -83,24 +83,23 @@ def _taken(
     sensor: str,
 ) -> tuple[Iterator[HandFrame], int]:
     """The frames to come and how many, after every option has been checked."""
-    from core.hand.marker import dictionaries
-    from devices.simulator.hands.model import load_hand
-    from devices.simulator.hands.sequence import SEQUENCES, USUAL_FRAMES, hand_sequence, training_frames
-    from devices.simulator.hands.shots import Holder
+    from devices.simulator.hands.sequence import (
+        SEQUENCES,
+        USUAL_FRAMES,
+        checked_configurations,
+        hand_sequence,
+        training_frames,
+    )
+    from devices.simulator.hands.shots import Holder, checked_holder
     from devices.simulator.room import make_rig
 
     if kind != _TRAINING and kind not in SEQUENCES:
         raise InputError(
             f"--kind: there is no simulated hand '{kind}'.", f"Choose {_TRAINING}, {', '.join(SEQUENCES)}."
         )
-    if marker_m != 0 and not 0.01 <= marker_m <= 0.08:
-        raise InputError("--marker-m: a marker on a hand has a side of 0.01 to 0.08 m.", "0 is for none.")
-    if dictionary not in dictionaries():
-        raise InputError(f"--dictionary: there is no ArUco dictionary '{dictionary}'.")
-    names = tuple(name.strip() for name in configurations.split(",") if name.strip())
-    load_hand(shape, side)
+    names = checked_configurations([name.strip() for name in configurations.split(",") if name.strip()])
+    holder = checked_holder(Holder(shape, side, seed, marker_m, dictionary))
     rig = make_rig((640, 480), device_seed=seed, sensor=sensor)
-    holder = Holder(shape, side, seed, marker_m, dictionary)
     count = frames or USUAL_FRAMES.get(kind, 60)
     if kind == _TRAINING:
         return (

@@ -36,6 +36,9 @@ _SHADOW_SLACK_M = 0.003
 _STEEP_COSINE = 0.2
 _BACK_M = -0.012
 _LENS_BLUR_PX = 0.7
+COLOR_NOISE = 0.012
+"""Standard deviation of a pixel, of full scale."""
+
 _LAMP = np.array([-0.4, -0.75, -0.53], np.float32)
 _WALL = (0.62, 0.64, 0.66)
 _CROSS = np.ones((3, 3), np.uint8)
@@ -79,7 +82,7 @@ def _rays(camera: PinholeCamera, turn: tuple[float, ...]) -> Image:
 
 
 @lru_cache(maxsize=4)
-def _wall_cosine(camera: PinholeCamera) -> Image:
+def wall_cosine(camera: PinholeCamera) -> Image:
     """Cosine (h, w) of the angle under which a pixel sees a wall square to the camera."""
     return np.asarray(1.0 / np.linalg.norm(camera.pixel_rays, axis=2), np.float32)
 
@@ -87,10 +90,16 @@ def _wall_cosine(camera: PinholeCamera) -> Image:
 @lru_cache(maxsize=4)
 def _background(camera: PinholeCamera) -> Image:
     """Picture (h, w, 3) of the wall, linear light."""
-    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    u, v = u * 640.0 / camera.width, v * 480.0 / camera.height
-    light = 0.8 + 0.1 * np.sin(u / 18.5) * np.cos(v / 26.5)
+    across = np.sin(np.arange(camera.width) * (640.0 / 18.5 / camera.width))
+    along = np.cos(np.arange(camera.height) * (480.0 / 26.5 / camera.height))
+    light = 0.8 + 0.1 * np.outer(along, across)
     return np.asarray(light[..., None] * linear(_WALL), np.float32)
+
+
+@lru_cache(maxsize=4)
+def empty_picture(camera: PinholeCamera) -> Image:
+    """Picture (h, w, 3) of the wall as the camera delivers it, 0 to 1, without noise."""
+    return np.asarray(cv2.pow(_background(camera), 1 / 2.2), np.float32)
 
 
 class HandScene:
@@ -167,7 +176,7 @@ class HandScene:
         camera = rig.sensor.depth_camera
         shape = (camera.height, camera.width)
         depth = np.full(shape, self._wall_m, np.float32)
-        cosine = _wall_cosine(camera).copy()
+        cosine = wall_cosine(camera).copy()
         shadow = np.zeros(shape, np.bool_)
         box = self.depth_box(rig)
         if not box.empty:
@@ -188,21 +197,33 @@ class HandScene:
         self,
         camera: PinholeCamera,
         color_from_depth: RigidTransform,
-        rng: np.random.Generator | None,
-        noise: float = 0.012,
+        rng: np.random.Generator,
+        noise: float = COLOR_NOISE,
     ) -> NDArray[np.uint8]:
-        """Colour picture (h, w, 3); without a generator it has no noise."""
-        light = _background(camera).copy()
-        box = self.box(camera, color_from_depth)
-        if not box.empty:
-            self._paint(light[box.slices], box, camera, color_from_depth)
-        picture = cv2.pow(np.clip(light, 0.0, 1.0, out=light), 1 / 2.2)
-        picture = cv2.GaussianBlur(picture, (0, 0), _LENS_BLUR_PX)
-        if self._view.blur_px > 1:
-            picture = cv2.filter2D(picture, -1, _streak(self._view.blur_px, self._view.blur_turn_rad))
-        if rng is not None:
-            picture += np.float32(noise) * rng.standard_normal(picture.shape, dtype=np.float32)
-        return np.asarray(np.clip(255.0 * picture, 0, 255).astype(np.uint8))
+        """Colour picture (h, w, 3)."""
+        picture = empty_picture(camera).copy()
+        box, patch = self.picture_patch(camera, color_from_depth)
+        picture[box.slices] = patch
+        picture += np.float32(noise) * rng.standard_normal(picture.shape, dtype=np.float32)
+        return np.asarray(cv2.convertScaleAbs(np.maximum(picture, 0.0, out=picture), alpha=255.0), np.uint8)
+
+    def picture_patch(self, camera: PinholeCamera, color_from_depth: RigidTransform) -> tuple[Box, Image]:
+        """The part of the picture, 0 to 1 and without noise, that differs from an empty room's."""
+        inner = self.box(camera, color_from_depth)
+        if inner.empty:
+            return inner, np.zeros((0, 0, 3), np.float32)
+        blur = self._view.blur_px
+        margin = 4 + int(np.ceil(0.5 * blur))
+        box = inner.grown(margin, margin, camera)
+        light = _background(camera)[box.slices].copy()
+        top, left = inner.top - box.top, inner.left - box.left
+        part = light[top : top + inner.bottom - inner.top, left : left + inner.right - inner.left]
+        self._paint(part, inner, camera, color_from_depth)
+        patch = cv2.pow(np.clip(light, 0.0, 1.0, out=light), 1 / 2.2)
+        patch = cv2.GaussianBlur(patch, (0, 0), _LENS_BLUR_PX)
+        if blur > 1:
+            patch = cv2.filter2D(patch, -1, _streak(blur, self._view.blur_turn_rad))
+        return box, np.asarray(patch, np.float32)
 
     def _paint(self, light: Image, box: Box, camera: PinholeCamera, color_from_depth: RigidTransform) -> None:
         """Paint everything in a box of the picture, in place."""

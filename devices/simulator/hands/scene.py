@@ -167,16 +167,17 @@ def take_frame(view: HandView, rig: SimulatedRig, rng: np.random.Generator) -> H
         rgb,
         stance="hand",
     )
-    return truth_of(view, scene, rig, capture)
+    points, seen = true_points(view, scene, rig)
+    return HandFrame(capture, points, seen, marker_corners(view))
 
 
-def truth_of(view: HandView, scene: HandScene, rig: SimulatedRig, capture: RgbdCapture) -> HandFrame:
-    """A capture of a view together with what is true about it."""
+def true_points(
+    view: HandView, scene: HandScene, rig: SimulatedRig
+) -> tuple[dict[str, FloatArray], dict[str, bool]]:
+    """The 15 points on the skin, depth-camera frame, and whether the depth camera sees them."""
     points = {name: view.depth_from_hand.apply(p) for name, p in view.model.points(view.vertices).items()}
     seen = scene.visible(rig.rig.depth, np.array([points[name] for name in POINT_NAMES]))
-    return HandFrame(
-        capture, points, dict(zip(POINT_NAMES, map(bool, seen), strict=True)), marker_corners(view)
-    )
+    return points, dict(zip(POINT_NAMES, map(bool, seen), strict=True))
 
 
 def marker_corners(view: HandView) -> FloatArray:

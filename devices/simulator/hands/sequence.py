@@ -69,6 +69,20 @@ def checked_configurations(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
+def checked_kind(kind: str) -> str:
+    """The kind, if there is a sequence of this kind.
+
+    Raises
+    ------
+    InputError
+    """
+    if kind not in SEQUENCES:
+        raise InputError(
+            f"There is no simulated sequence called '{kind}'.", f"Choose one of: {', '.join(SEQUENCES)}."
+        )
+    return kind
+
+
 def hand_motion(
     kind: str,
     holder: Holder,
@@ -102,10 +116,7 @@ def hand_motion(
     InputError
         For a kind or configuration that does not exist.
     """
-    if kind not in SEQUENCES:
-        raise InputError(
-            f"There is no simulated sequence called '{kind}'.", f"Choose one of: {', '.join(SEQUENCES)}."
-        )
+    checked_kind(kind)
     names = checked_configurations(configurations)
     usual = variation or HandVariation()
     rng = np.random.default_rng((0x5E9, SEQUENCES.index(kind), seed, holder.seed))

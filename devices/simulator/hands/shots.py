@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from core.capture.transform import RigidTransform
 from core.errors import InputError
-from devices.simulator.body import rotation_about
+from core.hand.marker import dictionaries
+from devices.simulator.body import SHAPES, rotation_about
 from devices.simulator.hands.model import CONFIGURATIONS, FingerAngles, HandPose, load_hand
 from devices.simulator.hands.scene import HandFrame, HandView, MarkerSheet, Thing, take_frame
 from devices.simulator.room import SimulatedRig, make_rig
 
 FloatArray = NDArray[np.float64]
 
+_MARKER_M = (0.01, 0.08)
 _TOWARD_CAMERA = np.diag([1.0, -1.0, -1.0])
 
 
@@ -88,6 +90,30 @@ class Holder:
     def tone(self) -> int:
         """Row of the skin tones."""
         return int(np.random.default_rng((0x70E, self.seed)).integers(0, 5))
+
+
+def checked_holder(holder: Holder) -> Holder:
+    """The holder, if there can be one like this.
+
+    Raises
+    ------
+    InputError
+    """
+    if holder.shape not in SHAPES:
+        raise InputError(
+            f"There is no simulated body called '{holder.shape}'.", f"Choose one of: {', '.join(SHAPES)}."
+        )
+    if holder.side not in ("R", "L"):
+        raise InputError("A hand is R or L.")
+    if not 0 <= holder.seed < 2**31:
+        raise InputError("The seed of a simulated hand is 0 to 2147483647.")
+    if holder.marker_m != 0 and not _MARKER_M[0] <= holder.marker_m <= _MARKER_M[1]:
+        raise InputError(
+            f"A simulated hand's marker has a side of {_MARKER_M[0]} to {_MARKER_M[1]} m.", "0 is for none."
+        )
+    if holder.dictionary not in dictionaries():
+        raise InputError(f"There is no ArUco dictionary '{holder.dictionary}'.")
+    return holder
 
 
 def varied(pose: HandPose, rng: np.random.Generator, variation: HandVariation) -> dict[str, FingerAngles]:
