@@ -62,7 +62,7 @@ def lesson_lines(told: dict[str, Any]) -> list[str]:
     lines += [f"{one['name']:{width}}  {one['frames']:6d}" for one in told["configurations"]]
     if told["unlabelled"]:
         lines.append(f"{told['unlabelled']} captures without labels were not used.")
-    for key, title in (("left_out", "Frames left out"), ("points_left_out", "Points left out")):
+    for key, title in (("left_out", "Frames left out"), ("points_left_out", "Said of frames that were used")):
         lines += _listed(title, [f"{one['capture']}: {one['reason']}" for one in told[key]])
     if told["confusion"] is not None:
         lines += _confusion_lines(told["confusion"], told["accuracy"])

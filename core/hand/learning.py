@@ -41,13 +41,14 @@ _FAULTY_SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFrame:
-    """A labelled frame's distances, and which of its points could not be measured.
+    """A labelled frame's distances, and what is less than it could be.
 
     Attributes
     ----------
     frame : LabelledFrame
     left_out : tuple of str
-        Sentences such as "index_tip is labelled 40 mm off the hand."
+        A sentence for each point that could not be measured, such as "index_tip is labelled 40 mm off the
+        hand."; and about anchors that were found with difficulty.
     """
 
     frame: LabelledFrame
@@ -88,7 +89,7 @@ class Lesson:
     left_out : tuple of (str, str)
         Frames that teach nothing, with the reason.
     points_left_out : tuple of (str, str)
-        Frames of which some points do not count, with a sentence for each such point.
+        Frames that teach, but less than they could: a sentence for each point that does not count.
     confusion : Confusion or None
         None with a single configuration.
     remarks : tuple of str
@@ -141,7 +142,8 @@ def measure_labelled(capture: RgbdCapture, labels: FrameLabels, finder: AnchorFi
     if len(lost) == len(labelled):
         raise WorkError("No labelled point hangs together with the anchors along the skin.")
     apart = "lies on skin that does not hang together with the anchors."
-    return MeasuredFrame(frame, (*faults, *(f"{POINT_NAMES[p]} {apart}" for p in lost)))
+    about_anchors = [] if anchors.reason is None else [anchors.reason]
+    return MeasuredFrame(frame, (*about_anchors, *faults, *(f"{POINT_NAMES[p]} {apart}" for p in lost)))
 
 
 def _on_skin(points: FloatArray, labelled: IntArray, surface: BodySurface) -> tuple[IntArray, list[str]]:
