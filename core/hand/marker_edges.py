@@ -48,7 +48,7 @@ class Outline:
         a, b, c, d = self.corners_px
         u, v = u[:, None], v[:, None]
         flat = (1 - u) * (1 - v) * a + u * (1 - v) * b + u * v * c + (1 - u) * v * d
-        return (1 - v) * top + v * bottom + (1 - u) * left + u * right - flat
+        return np.asarray((1 - v) * top + v * bottom + (1 - u) * left + u * right - flat)
 
     def _on(self, side: int, share: FloatArray) -> FloatArray:
         rows = np.full(len(share), side)

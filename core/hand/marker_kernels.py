@@ -20,7 +20,8 @@ def _brightness(gray: NDArray[np.uint8], x: float, y: float) -> float:
     u, v = int(x), int(y)
     a, b = x - u, y - v
     top = (1.0 - a) * gray[v, u] + a * gray[v, u + 1]
-    return (1.0 - b) * top + b * ((1.0 - a) * gray[v + 1, u] + a * gray[v + 1, u + 1])
+    below = (1.0 - a) * gray[v + 1, u] + a * gray[v + 1, u + 1]
+    return float((1.0 - b) * top + b * below)
 
 
 @njit(cache=True, nogil=True)
@@ -166,7 +167,8 @@ def fit_quadric(
             base[n, 3], base[n, 4], base[n, 5] = x * x, x * y, y * y
             inverse[n] = 1.0 / z
             n += 1
-    terms, spread = np.zeros(6), 0.0
+    terms: NDArray[np.float64] = np.zeros(6)
+    spread = 0.0
     if n < 6:
         return terms, spread, n
     weight, away = np.ones(n), np.empty(n)
@@ -183,7 +185,7 @@ def fit_quadric(
         for p in range(6):
             for q in range(p):
                 matrix[q, p] = matrix[p, q]
-        terms = np.linalg.solve(matrix, right)
+        terms[:] = np.linalg.solve(matrix, right)
         for i in range(n):
             fitted = 0.0
             for p in range(6):
