@@ -37,6 +37,7 @@ _LEAF_THRESHOLD = -2.0
 FloatArray = NDArray[np.float64]
 
 _Distance = Annotated[float, Field(ge=0.0, le=2.0)]
+_Mean = Annotated[float, Field(ge=-1.0, le=2.0)]
 _Sigma = Annotated[float, Field(gt=0.0, le=1.0)]
 _Deviation = Annotated[float, Field(ge=-2.0, le=2.0)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -143,7 +144,7 @@ class _Configuration(BaseModel):
     frames: _Frames
     fields: int = Field(gt=OWN_FIELDS, le=_MOST_ANCHORS + OWN_FIELDS)
     seen: list[_Share] = Field(min_length=POINTS, max_length=POINTS)
-    mean_m: list[_Distance | None]
+    mean_m: list[_Mean | None]
     sigma_m: list[_Sigma | None]
     modes_m: list[list[_Deviation]] = Field(min_length=1, max_length=_MOST_MODES)
 
