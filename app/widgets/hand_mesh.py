@@ -29,6 +29,8 @@ class HandMesh:
     ----------
     vertices : ndarray (n, 3) float32
     triangles : ndarray (m, 3) int64
+    faces : ndarray (4 m,) int64
+        The same as VTK takes them.
     normals : ndarray (n, 3) float32
         Toward the camera.
     colors : ndarray (n, 3) uint8
@@ -40,6 +42,7 @@ class HandMesh:
 
     vertices: NDArray[np.float32]
     triangles: NDArray[np.int64]
+    faces: NDArray[np.int64]
     normals: NDArray[np.float32]
     colors: NDArray[np.uint8]
     points_m: FloatArray
@@ -62,6 +65,7 @@ def hand_mesh(
     return HandMesh(
         vertices.astype(np.float32),
         triangles,
+        np.column_stack([np.full(len(triangles), 3, np.int64), triangles]).ravel(),
         normals.astype(np.float32),
         _colors(shot, vertices),
         lifted,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QSize, QTimer, Signal, Slot
 from PySide6.QtGui import QCloseEvent, QKeySequence, QPaintEvent, QShortcut
 from PySide6.QtWidgets import (
@@ -22,6 +24,9 @@ from app.theme import icon, icon_pixmap, palette, style_class
 from app.widgets.sheet import Sheet, tell
 from app.windows.login import LoginPage
 from core.errors import GeodermError
+
+if TYPE_CHECKING:
+    from app.windows.hand.window import HandWindow
 
 NAME = "GeoDerm"
 ABOUT = (
@@ -62,6 +67,7 @@ class MainWindow(QMainWindow):
         self._patients: QWidget | None = None
         self._patient: QWidget | None = None
         self._visit: QWidget | None = None
+        self._hand: HandWindow | None = None
         center = QWidget()
         column = QVBoxLayout(center)
         column.setContentsMargins(0, 0, 0, 0)
@@ -100,6 +106,8 @@ class MainWindow(QMainWindow):
         self.privacy.clicked.connect(self.context.set_privacy_mode)
         self.calibration = self._tool("cameras_calibration", "target", "Cameras and calibration")
         self.calibration.clicked.connect(self.show_calibration)
+        self.hand = self._tool("hand_joints", "hand", "Hand joints: a window of its own")
+        self.hand.clicked.connect(self.show_hand)
         self.about = self._tool("about", "info", "About GeoDerm")
         self.about.clicked.connect(lambda: tell(self, f"About {NAME}", ABOUT))
         self.user = QLabel()
@@ -118,6 +126,7 @@ class MainWindow(QMainWindow):
         row.addWidget(self.demo)
         row.addWidget(self.privacy)
         row.addWidget(self.calibration)
+        row.addWidget(self.hand)
         row.addWidget(self.about)
         row.addSpacing(8)
         row.addWidget(self.user)
@@ -184,6 +193,28 @@ class MainWindow(QMainWindow):
         CalibrationWizard(self, self.context).open()
 
     @Slot()
+    def show_hand(self) -> None:
+        """Open the hand application, or bring it to the front."""
+        if self._visit is not None:
+            tell(self, "The visit uses the camera", "Leave the visit first; it can be continued afterwards.")
+            return
+        if self._hand is None:
+            from app.windows.hand.desk import HandDesk
+            from app.windows.hand.window import HandWindow
+
+            self._hand = HandWindow(HandDesk.of(self.context))
+            self._hand.closed.connect(self._hand_closed)
+        self._hand.show()
+        self._hand.raise_()
+        self._hand.activateWindow()
+
+    @Slot()
+    def _hand_closed(self) -> None:
+        window, self._hand = self._hand, None
+        if window is not None:
+            window.deleteLater()
+
+    @Slot()
     def _find_patient(self) -> None:
         """Go to the list, unless a sheet waits for an answer."""
         if not any(sheet.isVisible() for sheet in self.findChildren(Sheet)):
@@ -220,6 +251,8 @@ class MainWindow(QMainWindow):
         except GeodermError as error:
             self._patient.report_error(error)
             return
+        if self._hand is not None:
+            self._hand.release_camera()
         page.finished.connect(lambda: self.show_patient(patient_id))
         page.closed.connect(lambda: self.show_patient(patient_id))
         self._visit = page
@@ -266,6 +299,9 @@ class MainWindow(QMainWindow):
             QTimer.singleShot(0, self.ready.emit)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102
+        if self._hand is not None and not self._hand.close():
+            event.ignore()
+            return
         self._leave_visit()
         for page in (self._patient, self._patients):
             if page is not None:

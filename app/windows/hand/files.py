@@ -67,14 +67,18 @@ class HandFiles(QObject):
     def load_model(self, path: Path) -> None:
         """Read a model and use it."""
 
-        def work(progress: Progress) -> HandModel:
+        def work(progress: Progress) -> tuple[HandModel, str]:
             from core.hand.model_file import read_model
 
-            return read_model(path)
+            return read_model(path), path.name
 
         task = self._tasks.start("Reading the model", work, cancellable=False)
-        task.finished.connect(lambda model: self._use(model, path.name))
+        task.finished.connect(self._on_read)
         task.failed.connect(self._tell_failure)
+
+    @Slot(object)
+    def _on_read(self, read: tuple[HandModel, str]) -> None:
+        self._use(*read)
 
     def save_model(self, model: HandModel) -> None:
         """Ask where to, and write a model."""
@@ -90,10 +94,12 @@ class HandFiles(QObject):
             return target
 
         task = self._tasks.start("Saving the model", work, cancellable=False)
-        task.finished.connect(
-            lambda saved: self._banner.show_success(f"The model was saved as {saved.name}.")
-        )
+        task.finished.connect(self._on_saved)
         task.failed.connect(self._tell_failure)
+
+    @Slot(object)
+    def _on_saved(self, target: Path) -> None:
+        self._banner.show_success(f"The model was saved as {target.name}.")
 
     # --- tracks ------------------------------------------------------------------------------------------
 
@@ -136,3 +142,7 @@ class HandFiles(QObject):
             f"{done.frames} frames exported as {done.paths[0].name}.",
             f"A hand was found in {done.with_hand} of them.",
         )
+
+    @Slot()
+    def _on_stopped(self) -> None:
+        self._banner.show_info("The export was stopped. Nothing was written.")

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from core.hand.hand_model import HandModel
     from devices.camera import DeviceInfo
 
+_NO_HANDS = ("simulator:", "simulator-board:")
+"""Simulated patients and boards hold no marked hand before the camera."""
+
 _CHOOSE, _NONE = "Live camera", "No live camera found"
 
 
@@ -101,12 +104,17 @@ class SourceBar(QFrame):
     @Slot(object)
     def set_cameras(self, cameras: Sequence[DeviceInfo]) -> None:
         """Which live cameras there are; the one in use stays chosen."""
-        chosen = self.cameras.currentData()
+        if self.cameras.view().isVisible():
+            return
+        cameras = [c for c in cameras if not c.id.startswith(_NO_HANDS)]
+        chosen, words = self.cameras.currentData(), self.cameras.currentText()
         self.cameras.clear()
         self.cameras.addItem(_CHOOSE if cameras else _NONE, "")
         for camera in cameras:
             self.cameras.addItem(camera.name, camera.id)
             self.cameras.setItemData(self.cameras.count() - 1, camera.name, Qt.ItemDataRole.ToolTipRole)
+        if chosen and self.cameras.findData(chosen) < 0:
+            self.cameras.addItem(words, chosen)
         self.cameras.setCurrentIndex(max(self.cameras.findData(chosen), 0))
 
     @Slot(int)
@@ -117,6 +125,8 @@ class SourceBar(QFrame):
 
     def set_source(self, recording: str | None, camera_id: str = "") -> None:
         """What is shown: a recording by its name, or a camera."""
+        if camera_id and self.cameras.findData(camera_id) < 0:
+            self.cameras.addItem("Camera by its address", camera_id)
         self.cameras.setCurrentIndex(max(self.cameras.findData(camera_id), 0))
         self.folder.setToolTip("Folder of captures (Ctrl+O)" if recording is None else f"Shown: {recording}")
 

@@ -291,7 +291,11 @@ class Training(QObject):
         self._overlay.attach(task)
         task.finished.connect(self._on_learned)
         task.failed.connect(self._tell_failure)
-        task.cancelled.connect(lambda: self._banner.show_info("Learning was stopped. Nothing was changed."))
+        task.cancelled.connect(self._on_stopped)
+
+    @Slot()
+    def _on_stopped(self) -> None:
+        self._banner.show_info("Learning was stopped. Nothing was changed.")
 
     @Slot(object)
     def _on_learned(self, lesson: Lesson) -> None:

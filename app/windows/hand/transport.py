@@ -57,8 +57,9 @@ class Transport(QFrame):
             button.setIconSize(QSize(22, 22))
             row.addWidget(button)
         row.addSpacing(4)
-        row.addWidget(self.slider, 1)
+        row.addWidget(self.slider, 1000)
         row.addSpacing(8)
+        row.addStretch(1)
         row.addWidget(self.place)
         row.addSpacing(8)
         row.addWidget(self.speed)
@@ -74,6 +75,8 @@ class Transport(QFrame):
         for widget in (self.back, self.forward, self.slider, self.speed):
             widget.setEnabled(frames > 1)
         self.play.setEnabled(live or frames > 1)
+        for widget in (self.back, self.forward, self.slider, self.speed):
+            widget.setVisible(not live)
         widest = f"frame {max(frames, 1)} of {max(frames, 1)}   {999.9:.2f} s"
         self.place.setFixedWidth(self.place.fontMetrics().horizontalAdvance(widest) + 4)
         self.place.setText("")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QTimer, Slot
+from PySide6.QtCore import QTimer, Signal, Slot
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 TITLE = "Hand joints"
 _RIGHT_WIDTH = 456
+_LOOK_AGAIN_MS = 4000
+"""Drivers are asked in the background: what they found is there a moment later."""
 
 
 class HandWindow(QWidget):
@@ -41,7 +43,14 @@ class HandWindow(QWidget):
     Parameters
     ----------
     desk : HandDesk
+
+    Signals
+    -------
+    closed()
+        It will not be shown again: make another one.
     """
+
+    closed = Signal()
 
     def __init__(self, desk: HandDesk) -> None:
         super().__init__()
@@ -82,7 +91,8 @@ class HandWindow(QWidget):
         self.bar.show_model(None, "")
         self.training.panel.set_proposing(False)
         self._set_mode("watch")
-        QTimer.singleShot(0, self.look_for_cameras)
+        for after_ms in (0, _LOOK_AGAIN_MS):
+            QTimer.singleShot(after_ms, self, self.look_for_cameras)
 
     @property
     def picture(self) -> HandPicture:
@@ -160,6 +170,8 @@ class HandWindow(QWidget):
     @Slot()
     def look_for_cameras(self) -> None:
         """Ask which cameras there are."""
+        if self._closing:
+            return
         cameras = self._desk.cameras
         task = self._desk.tasks.start(
             "Looking for cameras",
@@ -314,6 +326,8 @@ class HandWindow(QWidget):
 
     def use_model(self, model: HandModel, name: str) -> None:
         """Track with a model from now on."""
+        if self._closing:
+            return
         self.model = model
         self.engine.use(model, self.settings)
         self.bar.show_model(model, name)
@@ -340,3 +354,4 @@ class HandWindow(QWidget):
         self.engine.close()
         self.watch.view.close_view()
         super().closeEvent(event)
+        self.closed.emit()
