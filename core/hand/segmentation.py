@@ -30,6 +30,11 @@ FINGER_M = 0.026
 FINGER_M2 = 0.0030
 """Nor has it more skin in view."""
 
+CORE_M = 0.018
+"""Half the thickness of palm, wrist and forearm, and of things held, is more; half of a finger's less."""
+
+_ON_TOP_M = 0.005
+
 _LEAST_STEP_M, _AT_M = 0.0045, 0.75
 """Steps below this are noise, at this distance; depth noise grows with the distance's square."""
 
@@ -126,11 +131,14 @@ def part_of_hand(
         cx=cropped.cx - box[1].start,
         cy=cropped.cy - box[0].start,
     )
+    pixel_m = float(centre[2]) / camera.fx
     skin, smooth = np.ascontiguousarray(skin[box]), smooth[box]
     # the median has filled single holes
     crop = np.where(crop[box] > 0, crop[box], smooth)
-    chosen, foreign = _without_things(skin, marks[box], smooth, cropped, places)
+    chosen, foreign = _without_things(skin, marks[box], smooth, cropped, places, pixel_m)
     give_back_rim(chosen, foreign, crop, 0.5 * STEEP * change, 0.5 * _LEAST_STEP_M, _RIM_ROUNDS)
+    starts = _near_seeds(chosen.view(np.uint8), 1, smooth, cropped, places)
+    chosen &= ~_beyond_necks(chosen, crop, starts, pixel_m)
     if int(chosen.sum()) < _LEAST_PIXELS:
         raise _no_skin()
     touching = _goes_on(skin, crop, cropped, centre, reach_m)
@@ -173,7 +181,12 @@ def _near_seeds(
 
 
 def _without_things(
-    skin: Mask, marks: NDArray[np.uint8], smooth: Image, camera: PinholeCamera, places: FloatArray
+    skin: Mask,
+    marks: NDArray[np.uint8],
+    smooth: Image,
+    camera: PinholeCamera,
+    places: FloatArray,
+    pixel_m: float,
 ) -> tuple[Mask, Mask]:
     """Leave out what lies behind a doubtful slope and is thicker or larger than a finger.
 
@@ -187,7 +200,6 @@ def _without_things(
     _, labels = cv2.connectedComponents(sure.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     starts = _near_seeds(sure.view(np.uint8), 1, smooth, camera, places)
     own = int(np.bincount(labels[starts[:, 1], starts[:, 0]]).argmax())
-    pixel_m = float(np.median(places[:, 2])) / camera.fx
     area_m2 = np.bincount(labels.ravel()) * pixel_m**2
     area_m2[[0, own]] = 0.0
     is_thing = area_m2 > FINGER_M2
@@ -197,6 +209,36 @@ def _without_things(
         is_thing[np.unique(labels[inner > 0.5 * FINGER_M / pixel_m])] = True
     foreign = is_thing[labels] if is_thing.any() else np.zeros_like(sure)
     return sure & ~foreign, foreign
+
+
+def _beyond_necks(chosen: Mask, depth: Image, starts: NDArray[np.int64], pixel_m: float) -> Mask:
+    """What is thicker than any finger and hangs on the hand by fingers or narrower bridges only.
+
+    Where fingertips lie flat on a bottle no step is seen; but a hand is thick in one piece, palm and forearm.
+    """
+    nothing = np.zeros_like(chosen)
+    inner = cv2.distanceTransform(chosen.view(np.uint8), cv2.DIST_L2, 3)
+    thick = np.ascontiguousarray(inner > CORE_M / pixel_m)
+    count, cores = cv2.connectedComponents(thick.view(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    own = np.unique(cores[starts[:, 1], starts[:, 0]])
+    own = own[own > 0]
+    if count <= 1 + len(own) or len(own) == 0:
+        return nothing
+    things = thick & ~np.isin(cores, own)
+    away, nearest = cv2.distanceTransformWithLabels(
+        (~things).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    # fingers lie on the thing, nearer to the camera than its middle
+    level = np.zeros(int(nearest.max()) + 1, np.float32)
+    level[nearest[things]] = depth[things]
+    foreign = chosen & (away <= CORE_M / pixel_m + 2.0) & (depth > level[nearest] - _ON_TOP_M)
+    left = np.ascontiguousarray(chosen & ~foreign)
+    _, labels = cv2.connectedComponents(left.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
+    beside = cv2.dilate(foreign.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    loose = np.unique(labels[beside & left])
+    hand = np.unique(labels[starts[:, 1], starts[:, 0]])
+    loose = loose[~np.isin(loose, hand) & (loose > 0)]
+    return np.asarray(foreign | np.isin(labels, loose))
 
 
 def _no_skin() -> WorkError:
