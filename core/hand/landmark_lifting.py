@@ -67,9 +67,15 @@ class PictureDepth:
         inside = apart < (self._focal_px * radius_m / points[:, 2]) ** 2
         return pixels[inside], points[inside, 2]
 
-    def near_layer_m(self, pixel: FloatArray, radius_m: float = PATCH_M) -> float:
-        """Depth of the nearest surface in the patch under a picture pixel (2,); NaN if none is measured."""
+    def near_layer_m(
+        self, pixel: FloatArray, radius_m: float = PATCH_M, farthest_m: float = _RANGE_M[1]
+    ) -> float:
+        """Depth of the nearest surface in the patch under a picture pixel (2,); NaN if none is measured.
+
+        What is farther than ``farthest_m`` counts as not measured.
+        """
         depths = self.patch(pixel, radius_m)[1]
+        depths = depths[depths < farthest_m]
         if len(depths) < LEAST_PIXELS:
             return float("nan")
         near = np.percentile(depths, PERCENTILE, method="lower")
