@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from core.capture.transform import RigidTransform
 from devices.simulator.body import rotation_about
@@ -54,10 +55,7 @@ def grasp_of(model: HandModel) -> Grasp:
     skin = skin[skin[:, 1] > -0.03 * scale][:, 1:]
     y, z = np.meshgrid(np.linspace(-0.02, 0.05, 71) * scale, np.linspace(-0.09, -0.02, 71) * scale)
     places = np.stack([y.ravel(), z.ravel()], axis=1)
-    gap = np.min(
-        [np.linalg.norm(places - point, axis=1) for point in skin],
-        axis=0,
-    )
+    gap = np.asarray(cKDTree(skin).query(places)[0])
     slack = _TOUCH_M
     while not (gap > radius - slack).any():
         slack += _TOUCH_M

@@ -83,9 +83,9 @@ class _Loss:
 class MarkerLost:
     """The marker cannot be read for runs of 1 to 10 frames, and for two longer ones.
 
-    Two causes take turns: the hand shakes in a circle while the picture is exposed long (blur), and the back
-    of the hand tilts almost edge-on. Whether a detector really finds nothing then is up to the detector: the
-    remark of a frame says what was done, not what could be read.
+    Two causes take turns: the hand shakes in a circle while the picture is exposed long (blur), and the
+    forearm turns until the back of the hand is seen almost edge-on. Whether a detector really finds nothing
+    then is up to the detector: the remark of a frame says what was done, not what could be read.
     """
 
     hand: Hovering
@@ -133,9 +133,10 @@ class MarkerLost:
                 exposure_s=_DARK_EXPOSURE_S if full else moment.exposure_s,
                 remark="blurred" if full else "",
             )
-        tilt = rotation_about((1, 0, 0), self._sense * strength * np.deg2rad(_BEYOND_DEG))
+        # the forearm turns about its own axis: the back of the hand looks to the side
+        tilt = rotation_about((0, 1, 0), self._sense * strength * np.deg2rad(_BEYOND_DEG))
         return replace(
             moment,
-            depth_from_hand=RigidTransform(tilt @ pose.rotation, pose.translation),
+            depth_from_hand=RigidTransform(pose.rotation @ tilt, pose.translation),
             remark="tilted" if full else "",
         )

@@ -40,6 +40,7 @@ COLOR_NOISE = 0.012
 """Standard deviation of a pixel, of full scale."""
 
 _LAMP = np.array([-0.4, -0.75, -0.53], np.float32)
+_GRAIN = np.array([(310.0, -170.0), (190.0, 260.0), (240.0, 120.0)], np.float32)
 _WALL = (0.62, 0.64, 0.66)
 _CROSS = np.ones((3, 3), np.uint8)
 _NOTHING = np.iinfo(np.uint32).max
@@ -135,7 +136,7 @@ class HandScene:
     def _blocked(self, origin: FloatArray, targets: NDArray[np.floating], slack_m: float) -> BoolImage:
         """Whether something lies between a place and targets (..., 3), more than the slack before them."""
         rays = np.empty((*targets.shape[:-1], 6), np.float32)
-        way = targets - origin
+        way = (targets - origin).astype(np.float32)
         length = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-6)
         rays[..., :3], rays[..., 3:] = origin, way * np.maximum(1.0 - slack_m / length, 0.0)
         found = self._scene.test_occlusions(self._o3d.core.Tensor(rays), 0.0, 1.0)
@@ -293,12 +294,13 @@ class HandScene:
             color[rows] = albedo * light[:, None]
         return color, printed
 
-    def _skin(self, corners: NDArray[np.int32], weights: Image) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def _skin(self, corners: NDArray[np.int32], weights: Image) -> tuple[Image, NDArray[np.bool_]]:
         """Reflectance (k, 3) of the hand with what is printed on it."""
         view = self._view
-        place = _mixed(weights, view.model.reference, corners)
-        grain = 1.0 + 0.05 * np.sin(place @ (310.0, 190.0, 240.0)) * np.sin(place @ (-170.0, 260.0, 120.0))
-        albedo = np.asarray(linear(TONES[view.tone]) * grain[:, None])
+        place = _mixed(weights, view.model.reference.astype(np.float32), corners)
+        waves = np.sin(place @ _GRAIN)
+        grain = 1.0 + 0.05 * waves[:, :1] * waves[:, 1:]
+        albedo = np.asarray(linear(TONES[view.tone]).astype(np.float32) * grain)
         printed = np.zeros(len(place), np.bool_)
         on_back = np.flatnonzero(place[:, 2] > _BACK_M)
         for sheet in view.markers:

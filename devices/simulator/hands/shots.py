@@ -185,3 +185,15 @@ def shoot(
     view = replace(view, blur_px=blur_px, things=things)
     frame = take_frame(view, rig or make_rig((640, 480), device_seed=holder.seed), rng)
     return replace(frame, configuration=configuration)
+
+
+def shoot_nobody(
+    seed: int = 0, *, rig: SimulatedRig | None = None, things: tuple[Thing, ...] = (), wall_m: float = 1.4
+) -> HandFrame:
+    """One frame without any hand: the wall, and the things given. It has no points."""
+    hand = load_hand()
+    behind = RigidTransform(np.eye(3), np.array([0.0, 0.0, -5.0]))
+    view = HandView(hand, hand.reference, behind, (), things, wall_m)
+    rng = np.random.default_rng((0x5408, seed))
+    frame = take_frame(view, rig or make_rig((640, 480), device_seed=seed), rng)
+    return replace(frame, points_m={}, visible={})
