@@ -151,23 +151,24 @@ def track(
     options = TrackingOptions(refinement=refinement.value, configuration=configuration)
     if threshold_mm is not None:
         options = replace(options, threshold_m=threshold_mm / 1000.0)
-    tracks, seconds = _followed(model, sequence, options)
+    tracks, times_s = _followed(model, sequence, options)
     write_tracks(out, tracks)
     if csv is not None:
         write_csv(csv, tracks)
-    told = hand_words.tracks_document(tracks, out, seconds)
+    told = hand_words.tracks_document(tracks, out, times_s)
     typer.echo(json.dumps(told, indent=1) if as_json else "\n".join(hand_words.tracks_lines(told)))
 
 
-def _followed(model: HandModel, sequence: Path, options: TrackingOptions) -> tuple[Tracks, float]:
-    """Tracks of a sequence, and the seconds that tracking alone took."""
+def _followed(model: HandModel, sequence: Path, options: TrackingOptions) -> tuple[Tracks, list[float]]:
+    """Tracks of a sequence, and the seconds that tracking alone took for each frame."""
     from app.cli import hand_words
     from app.cli.hand_frames import same_rig, sequence_frames
     from core.hand.tracker import HandTracker
     from core.hand.tracks import TrackedFrame, Tracks, tracked_frame
 
     count, frames = sequence_frames(sequence)
-    ticker, seconds = hand_words.Ticker(), 0.0
+    ticker = hand_words.Ticker()
+    times_s: list[float] = []
     kept: list[TrackedFrame] = []
     tracker: HandTracker | None = None
     rig: CameraRig | None = None
@@ -179,12 +180,12 @@ def _followed(model: HandModel, sequence: Path, options: TrackingOptions) -> tup
                 rig = frame.rig
                 tracker = HandTracker(model, rig, finder, options)
             answer = tracker.track(frame.depth_m, frame.rgb)
-            seconds += time.perf_counter() - begun_s
+            times_s.append(time.perf_counter() - begun_s)
             kept.append(tracked_frame(frame.name, answer))
     ticker(1.0)
     if not kept:
         raise InputError(f"{sequence}: has no frames.", "Choose another recording.")
-    return Tracks(tuple(kept)), seconds
+    return Tracks(tuple(kept)), times_s
 
 
 def _labelled(folders: list[Path]) -> Iterator[tuple[str, RgbdCapture, FrameLabels]]:

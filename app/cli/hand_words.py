@@ -97,8 +97,12 @@ def _confusion_lines(confusion: dict[str, Any], accuracy: float) -> list[str]:
     return lines
 
 
-def tracks_document(tracks: Tracks, out: Path, seconds: float) -> dict[str, Any]:
-    """A summary of tracks as a JSON object."""
+def tracks_document(tracks: Tracks, out: Path, times_s: list[float]) -> dict[str, Any]:
+    """A summary of tracks as a JSON object.
+
+    The rate leaves out the first frame, in which libraries load and the hand is looked for everywhere.
+    """
+    later_s = sum(times_s[1:])
     frames = tracks.frames
     found = [[p for p in frame.points.values() if p is not None] for frame in frames]
     confidences = [point.confidence for points in found for point in points]
@@ -114,7 +118,7 @@ def tracks_document(tracks: Tracks, out: Path, seconds: float) -> dict[str, Any]
             {"name": name, "frames": n, "share": round(n / len(frames), 4)} for name, n in named.most_common()
         ],
         "median_confidence": round(median(confidences), 4) if confidences else None,
-        "frames_per_second": round(len(frames) / seconds, 2) if seconds > 0 else None,
+        "frames_per_second": round((len(frames) - 1) / later_s, 2) if later_s > 0 else None,
         "reasons": [{"reason": reason, "frames": n} for reason, n in reasons.most_common()],
     }
 
@@ -137,6 +141,7 @@ def tracks_lines(told: dict[str, Any]) -> list[str]:
             f"median confidence {told['median_confidence']:.2f}"
         )
     lines += _listed("Said of frames", [f"{one['reason']} ({one['frames']})" for one in told["reasons"]])
-    if told["frames_per_second"] is not None:
-        lines.append(f"{told['frames_per_second']:.1f} frames/s for tracking alone: {told['tracks']}")
+    rate = told["frames_per_second"]
+    speed = "" if rate is None else f"{rate:.1f} frames/s after the first, without reading files. "
+    lines.append(f"{speed}Written: {told['tracks']}")
     return lines
