@@ -59,7 +59,9 @@ def _group() -> None:
 
 
 def train(
-    dataset: Path = typer.Argument(..., help="Folder of capture folders, labelled by a hand.json each."),
+    dataset: Path = typer.Argument(
+        ..., metavar="DATASET", help="Folder of capture folders, labelled by a hand.json each."
+    ),
     out: Path = typer.Option(..., "--out", help="Model file to write."),
     marker_m: float = typer.Option(0.036, "--marker-m", help="Side of the marker's black square, metres."),
     dictionary: str = typer.Option("DICT_4X4_50", "--dictionary", help="ArUco dictionary of the marker."),
@@ -114,7 +116,9 @@ def train(
 
 def track(
     model_file: Path = typer.Argument(..., metavar="MODEL", help="Model file of geoderm hand train."),
-    sequence: Path = typer.Argument(..., help="Folder of capture folders, a capture folder, or .oni file."),
+    sequence: Path = typer.Argument(
+        ..., metavar="SEQUENCE", help="Folder of capture folders, a capture folder, or .oni file."
+    ),
     out: Path = typer.Option(..., "--out", help="tracks.json to write."),
     marker_m: float | None = typer.Option(
         None, "--marker-m", help="Side of the marker, if it is another than the model's."
@@ -142,6 +146,8 @@ def track(
 
     _check_out("--out", out)
     _check_out("--csv", csv)
+    if csv is not None and csv.resolve() == out.resolve():
+        raise InputError(f"--csv {csv}: is the file of --out, too.", "Give another name.")
     model = _overridden(read_model(model_file), marker_m, dictionary)
     if configuration is not None and configuration not in model.configurations:
         raise InputError(

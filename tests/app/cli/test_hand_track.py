@@ -186,14 +186,16 @@ def test_a_strict_threshold_reports_fewer_points(model: Path, sequence: Path, tm
         (("--marker-m", "36"), "0.036"),
         (("--dictionary", "DICT_9X9"), "DICT_9X9"),
         (("--csv", "absent/t.csv"), "--csv"),
+        (("--csv", "{out}"), "--out"),
     ],
 )
 def test_wrong_options_of_tracking_are_told(
     model: Path, sequence: Path, tmp_path: Path, options: tuple[str, ...], words: str
 ) -> None:
-    outcome = geoderm("hand", "track", model, sequence, "--out", tmp_path / "t.json", *options)
-    assert_told(outcome, 2, words)
-    assert not (tmp_path / "t.json").exists()
+    out = tmp_path / "t.json"
+    given = [option.replace("{out}", str(out)) for option in options]
+    assert_told(geoderm("hand", "track", model, sequence, "--out", out, *given), 2, words)
+    assert not out.exists()
 
 
 def test_wrong_files_of_tracking_are_told(model: Path, sequence: Path, tmp_path: Path) -> None:
