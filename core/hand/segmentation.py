@@ -218,13 +218,15 @@ def _beyond_necks(chosen: Mask, depth: Image, starts: NDArray[np.int64], pixel_m
     """
     nothing = np.zeros_like(chosen)
     inner = cv2.distanceTransform(chosen.view(np.uint8), cv2.DIST_L2, 3)
-    thick = np.ascontiguousarray(inner > CORE_M / pixel_m)
-    count, cores = cv2.connectedComponents(thick.view(np.uint8), connectivity=8, ltype=cv2.CV_32S)
+    broad = np.ascontiguousarray(inner > 0.5 * FINGER_M / pixel_m)
+    count, cores = cv2.connectedComponents(broad.view(np.uint8), connectivity=8, ltype=cv2.CV_32S)
     own = np.unique(cores[starts[:, 1], starts[:, 0]])
     own = own[own > 0]
     if count <= 1 + len(own) or len(own) == 0:
         return nothing
-    things = thick & ~np.isin(cores, own)
+    things = (inner > CORE_M / pixel_m) & ~np.isin(cores, own)
+    if not things.any():
+        return nothing
     away, nearest = cv2.distanceTransformWithLabels(
         (~things).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
