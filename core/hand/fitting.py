@@ -1,9 +1,9 @@
 """Where the 15 points lie on a hand's surface: solved jointly over all points (after thesis eq. 7).
 
-Every vertex has its distances to the anchors. A point's candidates are the places whose distances agree best
-with the model; which candidate of each point is right is decided together, by the distances between the
-points; what the chosen ones say about the size of the hand and the sitting of the marker goes back into the
-model's modes, and the candidates are found anew.
+Every vertex has its distances to the anchors, and a point lies where they agree best with the model. Which
+place of each point is right is decided together: by the distances between the points, measured along the
+skin from where the others were put. What the places say about the size of the hand, the sitting of the
+marker and the bend of the fingers goes back into the model's modes, and all is looked for anew.
 """
 
 from __future__ import annotations
@@ -14,23 +14,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.geodesics.solver import GeodesicSolver
-from core.hand.model import POINTS, ConfigurationModel, coefficients
+from core.hand.model import OWN_FIELDS, POINTS, ConfigurationModel, coefficients
 from core.hand.names import PAIRS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-CANDIDATES = 4
-_APART_M = 0.008
+_I, _J = np.array(PAIRS).T
+
 _MEASURED_SIGMA_M = 0.002
 _PAIR_SIGMA_M = 0.003
 _COST_CAP = 60.0
 _PAIR_CAP = 9.0
-_ABSENT_COST = 30.0
-_SELDOM = 0.2
-_ROUNDS = 4
-_SWEEPS = 5
+_PAIR_SHARE = 6.0
+_PAIR_WEIGHT = 0.1
+_ABSENT_COST = 25.0
+_SELDOM = 0.05
+_ROUNDS = 3
+_SWEEPS = 3
 _STARTS = (-1.5, 0.0, 1.5)
+_START_MODES = 1
+_MOVED_M = 0.002
+_TAIL = 4.0
+_REACH_M = 0.008
+_NEAR_CAP = 9.0
+_OWN_CAP = 6.0
+_QUICK_OWN_CAP = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Hint:
+    """What the frames before say.
+
+    Attributes
+    ----------
+    b : ndarray (k,)
+        Mode coefficients.
+    near_m : ndarray (15, 3)
+        Where points are expected, NaN if not known.
+    near_sigma_m : float
+    """
+
+    b: FloatArray
+    near_m: FloatArray
+    near_sigma_m: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +73,14 @@ class HandFit:
         Vertex nearest to each point, -1 where absent.
     anchor_error_m : ndarray (15,)
         RMS difference between the point's distances to the anchors and the model's, NaN where absent.
-    cost : float
-        Mean cost of a point that the configuration should show; comparable between configurations.
+    pair_error_m : ndarray (15,)
+        Median absolute difference between its distances to the other points and the model's.
+    spread_m : ndarray (15,)
+        How far the places reach that are about as likely.
+    cost : ndarray (15,)
+        Of each point's place, NaN where absent.
+    pair_m, expected_pair_m : ndarray (105,)
+        Distances between the points, measured and by the model.
     b : ndarray (k,)
         Mode coefficients.
     """
@@ -56,7 +89,11 @@ class HandFit:
     points_m: FloatArray
     vertices: IntArray
     anchor_error_m: FloatArray
-    cost: float
+    pair_error_m: FloatArray
+    spread_m: FloatArray
+    cost: FloatArray
+    pair_m: FloatArray
+    expected_pair_m: FloatArray
     b: FloatArray
 
 
@@ -65,10 +102,7 @@ def fit_configuration(
     vertices_m: FloatArray,
     distances_m: FloatArray,
     solver: GeodesicSolver,
-    *,
-    b: FloatArray | None = None,
-    near_m: FloatArray | None = None,
-    near_sigma_m: float = 0.03,
+    hint: Hint | None = None,
 ) -> HandFit:
     """Find the points of one configuration.
 
@@ -76,162 +110,187 @@ def fit_configuration(
     ----------
     model : ConfigurationModel
     vertices_m : ndarray (n, 3)
-    distances_m : ndarray (a, n)
-        Geodesic fields of the anchors.
+    distances_m : ndarray (a + 2, n)
+        Of every vertex (`core.hand.fields`).
     solver : GeodesicSolver
         Of the same surface.
-    b : ndarray (k,), optional
-        Coefficients of the frame before; without it several sizes of hand are tried.
-    near_m : ndarray (15, 3), optional
-        Where the points were (NaN: unknown), already moved with the marker: temporal continuity.
-    near_sigma_m : float
+    hint : Hint, optional
+        Without it several sizes of hand are tried.
     """
-    starts = [b] if b is not None else [np.eye(len(model.modes_m))[0] * s for s in _STARTS]
-    tries = []
-    for start in starts:
-        search = _Search(model, vertices_m, distances_m, near_m, near_sigma_m)
-        quick = search.run(start, None)
-        tries.append((search.unary_total(quick), quick))
-    best = min(tries, key=lambda t: t[0])[1]
-    search = _Search(model, vertices_m, distances_m, near_m, near_sigma_m)
-    return search.finish(search.run(best, solver))
+    search = _Search(model, vertices_m, distances_m, hint)
+    if hint is not None:
+        b = hint.b
+    else:
+        modes = np.eye(len(model.modes_m))
+        starts = [start * modes[k] for k in range(_START_MODES) for start in _STARTS if start or not k]
+        b = min((search.quickly(start) for start in starts), key=search.misfit)
+    return search.jointly(b, solver)
 
 
 class _Search:
     def __init__(
-        self,
-        model: ConfigurationModel,
-        vertices: FloatArray,
-        distances: FloatArray,
-        near: FloatArray | None,
-        near_sigma: float,
+        self, model: ConfigurationModel, vertices: FloatArray, distances: FloatArray, hint: Hint | None
     ) -> None:
-        self._model, self._vertices, self._distances = model, vertices, distances
+        self._model = model
+        self._vertices = np.ascontiguousarray(vertices)
+        self._distances = np.ascontiguousarray(distances)
+        self._hint = hint
         variance = model.anchor_sigma_m**2 + _MEASURED_SIGMA_M**2
         self._weight = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
-        self._likely = (model.seen > _SELDOM) & (self._weight > 0).all(axis=1)
-        self._pull = np.zeros((POINTS, len(vertices)))
-        if near is not None:
-            for p in np.flatnonzero(np.isfinite(near).all(axis=1)):
-                off = ((vertices - near[p]) ** 2).sum(axis=1) / near_sigma**2
-                self._pull[p] = np.minimum(off, 9.0)
-        self._chosen = np.full(POINTS, -1, np.int64)
+        self._likely = (model.seen > _SELDOM) & (self._weight > 0).any(axis=1)
+        variance = model.sigma_m**2 + _MEASURED_SIGMA_M**2
+        self._inverse = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
+        self._inverse[POINTS * model.fields :] *= _PAIR_WEIGHT  # pairs repeat what the points say
+        self._cost = np.empty((POINTS, len(vertices)))
 
-    def unary(self, b: FloatArray) -> FloatArray:
-        """Cost (15, n) of every vertex for every point; large for points the configuration never shows."""
-        expected, _ = self._model.expected(b)
-        cost = np.full((POINTS, len(self._vertices)), np.inf)
-        for p in np.flatnonzero(self._likely):
-            off = self._distances - expected[p][:, None]
-            cost[p] = np.minimum((off**2 * self._weight[p][:, None]).sum(axis=0), 1e6) + self._pull[p]
-        return cost
+    def _anchor_costs(self, b: FloatArray, own_cap: float = 0.0) -> FloatArray:
+        """Cost (15, n) of every vertex for every point by the anchors; overwritten by the next call."""
+        from core.hand.fit_kernels import anchor_costs
 
-    def unary_total(self, b: FloatArray) -> float:
-        """Sum of each point's best cost, capped: how well a hand of these coefficients fits at all."""
-        cost = self.unary(b)[self._likely]
+        near, near_weight = np.full((POINTS, 3), np.nan), 0.0
+        if self._hint is not None:
+            near, near_weight = self._hint.near_m, 1.0 / self._hint.near_sigma_m**2
+        expected = np.nan_to_num(self._model.expected(b)[0])
+        anchor_costs(
+            self._distances,
+            expected,
+            self._weight,
+            self._likely,
+            self._vertices,
+            near,
+            near_weight,
+            _NEAR_CAP,
+            OWN_FIELDS,
+            own_cap or _OWN_CAP,
+            self._cost,
+        )
+        return self._cost
+
+    def misfit(self, b: FloatArray) -> float:
+        """How badly a hand of these coefficients fits at all."""
+        cost = self._anchor_costs(b, _QUICK_OWN_CAP)[self._likely]
         return float(np.minimum(cost.min(axis=1), _COST_CAP).sum() + b @ b) if len(cost) else np.inf
 
-    def run(self, b: FloatArray, solver: GeodesicSolver | None) -> FloatArray:
-        """Alternate between candidates, choice and coefficients; without a solver pairs do not count."""
+    def quickly(self, b: FloatArray) -> FloatArray:
+        """Coefficients by the anchors alone, from a start."""
         for _ in range(_ROUNDS):
-            cost = self.unary(b)
-            candidates, values = self._candidates(cost)
-            pair = None if solver is None else self._pair_distances(candidates, solver)
-            self._chosen, pair_m = self._choose(b, candidates, values, pair)
-            b = self._update(pair_m)
+            cost = self._anchor_costs(b, _QUICK_OWN_CAP)
+            chosen = cost.argmin(axis=1)
+            there = cost[np.arange(POINTS), chosen] < _COST_CAP
+            b = self._update(b, np.where(there, chosen, -1), np.full(len(PAIRS), np.nan))
         return b
 
-    def _candidates(self, cost: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Vertices (15, c) of the best separate places of every point, -1 for none, and their costs."""
-        chosen = np.full((POINTS, CANDIDATES), -1, np.int64)
-        values = np.full((POINTS, CANDIDATES), np.inf)
-        for p in np.flatnonzero(self._likely):
-            left = cost[p].copy()
-            for c in range(CANDIDATES):
-                v = int(np.argmin(left))
-                if left[v] > _COST_CAP:
-                    break
-                chosen[p, c], values[p, c] = v, left[v]
-                close = ((self._vertices - self._vertices[v]) ** 2).sum(axis=1) < _APART_M**2
-                left[close] = np.inf
-        return chosen, values
+    def jointly(self, b: FloatArray, solver: GeodesicSolver) -> HandFit:
+        """Points and coefficients by anchors and by one another."""
+        from core.hand.fit_kernels import joint_costs
 
-    def _pair_distances(self, candidates: IntArray, solver: GeodesicSolver) -> FloatArray:
-        """Geodesics (15 c, 15 c) between candidates; NaN where there is none."""
-        flat = candidates.ravel()
-        there = np.flatnonzero(flat >= 0)
-        out = np.full((len(flat), len(flat)), np.nan)
-        if len(there):
-            unique, back = np.unique(flat[there], return_inverse=True)
-            fields = solver.distances([int(v) for v in unique])
-            out[np.ix_(there, there)] = fields[back][:, flat[there]]
-        return out
+        cost = self._anchor_costs(b)
+        vertex = cost.argmin(axis=1)
+        chosen = cost[np.arange(POINTS), vertex] < _ABSENT_COST
+        fields = np.full(cost.shape, np.inf)
+        source = np.full(POINTS, -1, np.int64)
+        total = np.full(cost.shape, np.inf)
+        weight = self._pair_weight()
+        for sweep in range(_SWEEPS):
+            self._renew(fields, source, vertex, chosen, solver)
+            if sweep:
+                b = self._update(b, np.where(chosen, vertex, -1), self._pairs(fields, vertex, chosen))
+                cost = self._anchor_costs(b)
+            expected = self._pair_table(b)
+            for p in np.flatnonzero(self._likely):
+                best = joint_costs(
+                    p, cost[p], _COST_CAP, fields, chosen, expected, weight, _PAIR_CAP, _PAIR_SHARE, total[p]
+                )
+                chosen[p] = best >= 0 and total[p, best] < _ABSENT_COST
+                if best >= 0:
+                    vertex[p] = best
+        self._renew(fields, source, vertex, chosen, solver)
+        return self._answer(b, vertex, chosen, fields, total)
 
-    def _choose(
-        self, b: FloatArray, candidates: IntArray, values: FloatArray, pair: FloatArray | None
-    ) -> tuple[IntArray, FloatArray]:
-        """One candidate or none (-1) for every point, by sweeps over the points with the others fixed."""
-        pick = np.where(values[:, 0] < _ABSENT_COST, 0, -1)
-        pair_m = np.full(len(PAIRS), np.nan)
-        rows = np.arange(POINTS)
-        if pair is not None:
-            _, expected = self._model.expected(b)
-            sigma = np.sqrt(self._model.pair_sigma_m**2 + _PAIR_SIGMA_M**2)
-            blocks = pair.reshape(POINTS, CANDIDATES, POINTS, CANDIDATES)
-            table = np.full((POINTS, POINTS), np.nan)
-            spread = np.full((POINTS, POINTS), np.nan)
-            for k, (i, j) in enumerate(PAIRS):
-                table[i, j] = table[j, i] = expected[k]
-                spread[i, j] = spread[j, i] = sigma[k]
-            for _ in range(_SWEEPS):
-                before = pick.copy()
-                for p in rows[self._likely]:
-                    others = np.flatnonzero((pick >= 0) & (rows != p))
-                    seen = blocks[p][:, others, pick[others]]
-                    off = ((seen - table[p, others]) / spread[p, others]) ** 2
-                    pairs = (
-                        np.nanmean(np.where(np.isfinite(off), np.minimum(off, _PAIR_CAP), np.nan), axis=1)
-                        if len(others)
-                        else np.zeros(CANDIDATES)
-                    )
-                    total = values[p] + 4.0 * np.nan_to_num(pairs, nan=_PAIR_CAP)
-                    best = int(np.argmin(total))
-                    pick[p] = best if total[best] < _ABSENT_COST else -1
-                if (pick == before).all():
-                    break
-            for k, (i, j) in enumerate(PAIRS):
-                if pick[i] >= 0 and pick[j] >= 0:
-                    pair_m[k] = blocks[i, pick[i], j, pick[j]]
-        return np.where(pick >= 0, candidates[rows, np.maximum(pick, 0)], -1), pair_m
+    def _renew(
+        self,
+        fields: FloatArray,
+        source: IntArray,
+        vertex: IntArray,
+        chosen: NDArray[np.bool_],
+        solver: GeodesicSolver,
+    ) -> None:
+        """Distance fields from the points that have moved since their field was made."""
+        moved = np.linalg.norm(self._vertices[vertex] - self._vertices[source], axis=1) > _MOVED_M
+        rows = np.flatnonzero(chosen & (moved | (source < 0)))
+        if len(rows):
+            fields[rows] = solver.distances([int(v) for v in vertex[rows]])
+            source[rows] = vertex[rows]
 
-    def _update(self, pair_m: FloatArray) -> FloatArray:
+    def _pairs(self, fields: FloatArray, vertex: IntArray, chosen: NDArray[np.bool_]) -> FloatArray:
+        """Distances (105,) between the chosen places; NaN where there is none."""
+        between = fields[:, vertex]
+        with np.errstate(invalid="ignore"):
+            mean = 0.5 * (between[_I, _J] + between[_J, _I])
+        return np.where(chosen[_I] & chosen[_J] & np.isfinite(mean), mean, np.nan)
+
+    def _pair_table(self, b: FloatArray) -> FloatArray:
+        table = np.zeros((POINTS, POINTS))
+        table[_I, _J] = table[_J, _I] = np.nan_to_num(self._model.expected(b)[1])
+        return table
+
+    def _pair_weight(self) -> FloatArray:
+        variance = self._model.pair_sigma_m**2 + _PAIR_SIGMA_M**2
+        weight = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
+        table = np.zeros((POINTS, POINTS))
+        table[_I, _J] = table[_J, _I] = weight
+        return table
+
+    def _update(self, b: FloatArray, vertex: IntArray, pair_m: FloatArray) -> FloatArray:
+        """Coefficients by what was measured at the places; distances that stray count little."""
         model = self._model
-        measured = np.full((POINTS, model.anchors), np.nan)
-        there = self._chosen >= 0
-        measured[there] = self._distances[:, self._chosen[there]].T
+        measured = np.full((POINTS, model.fields), np.nan)
+        there = vertex >= 0
+        measured[there] = self._distances[:, vertex[there]].T
+        measured[~np.isfinite(measured)] = np.nan
         difference = np.concatenate([measured.ravel(), pair_m]) - model.mean_m
-        variance = model.sigma_m**2 + _MEASURED_SIGMA_M**2
-        weight = 1.0 / variance
-        weight[POINTS * model.anchors :] *= 0.1  # pairs repeat what the points say
-        b = coefficients(difference, model.modes_m, weight)
         for _ in range(2):
-            off = (difference - b @ model.modes_m) ** 2 * weight
-            b = coefficients(difference, model.modes_m, weight / (1.0 + np.nan_to_num(off) / 4.0))
+            off = (difference - b @ model.modes_m) ** 2 * self._inverse
+            b = coefficients(difference, model.modes_m, self._inverse / (1.0 + np.nan_to_num(off) / _TAIL))
         return b
 
-    def finish(self, b: FloatArray) -> HandFit:
-        """Points between vertices: the mean of the vertices around the chosen one, by likelihood."""
-        cost = self.unary(b)
-        points, error = np.full((POINTS, 3), np.nan), np.full(POINTS, np.nan)
-        expected, _ = self._model.expected(b)
-        for p in np.flatnonzero(self._chosen >= 0):
-            v = self._chosen[p]
-            near = np.flatnonzero(((self._vertices - self._vertices[v]) ** 2).sum(axis=1) < _APART_M**2)
-            w = np.exp(-0.5 * (cost[p, near] - cost[p, near].min()))
-            points[p] = w @ self._vertices[near] / w.sum()
-            off = self._distances[:, near] @ w / w.sum() - expected[p]
-            error[p] = np.sqrt(np.mean(off**2))
-        shown = self._likely & (self._model.seen > 0.6)
-        best = np.where(self._chosen >= 0, cost[np.arange(POINTS), np.maximum(self._chosen, 0)], _ABSENT_COST)
-        total = float(np.minimum(best[shown], _ABSENT_COST).mean() + b @ b / 4.0) if shown.any() else np.inf
-        return HandFit(self._model.name, points, self._chosen.copy(), error, total, b)
+    def _answer(
+        self,
+        b: FloatArray,
+        vertex: IntArray,
+        chosen: NDArray[np.bool_],
+        fields: FloatArray,
+        total: FloatArray,
+    ) -> HandFit:
+        """Places between vertices, and how sure they are."""
+        from core.hand.fit_kernels import weighted_place
+
+        points = np.full((POINTS, 3), np.nan)
+        anchor_error, spread, cost = (np.full(POINTS, np.nan) for _ in range(3))
+        expected, expected_pair = self._model.expected(b)
+        for p in np.flatnonzero(chosen):
+            v = int(vertex[p])
+            *place, spread[p] = weighted_place(total[p], self._vertices, v, _REACH_M)
+            points[p] = place
+            cost[p] = total[p, v]
+            off = (self._distances[:, v] - expected[p])[:-OWN_FIELDS]
+            anchor_error[p] = np.sqrt(np.nanmean(off**2))
+        pair = self._pairs(fields, vertex, chosen)
+        off = np.abs(pair - expected_pair)
+        pair_error = np.full(POINTS, np.nan)
+        for p in np.flatnonzero(chosen):
+            own = off[(_I == p) | (_J == p)]
+            if np.isfinite(own).any():
+                pair_error[p] = np.nanmedian(own)
+        return HandFit(
+            self._model.name,
+            points,
+            np.where(chosen, vertex, -1),
+            anchor_error,
+            pair_error,
+            spread,
+            cost,
+            pair,
+            np.where(np.isfinite(pair), expected_pair, np.nan),
+            b,
+        )

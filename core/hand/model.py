@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import InputError
+from core.hand.flat import SIZE_SHARE, lay_flat, likely_changes
 from core.hand.names import POINT_NAMES
 
 FloatArray = NDArray[np.float64]
@@ -18,12 +19,17 @@ LEAST_FRAMES = 3
 
 POINTS = len(POINT_NAMES)
 
-_LEAST_SIGMA_M = 0.0015
-_MOST_MODES = 6
-_FRAMES_PER_MODE = 4
-_SIZE_SIGMA = 0.12
-_MEASURED_SIGMA_M = 0.003
-_ROUNDS = 12
+OWN_FIELDS = 2
+"""Distances of a point beside those from the anchors: to the rim, and to the end (`core.hand.fields`)."""
+
+_LEAST_SIGMA_M = 0.001
+_SIGMA_M = 0.002
+_RIM_SIGMA_M = 0.0015
+_END_SIGMA_M = 0.005
+_MODES = 10
+_PRIOR_FRAMES = 6.0
+_MEASURED_SIGMA_M = 0.002
+_ROUNDS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +39,9 @@ class LabelledFrame:
     Attributes
     ----------
     configuration : str
-    anchor_m : ndarray (15, a)
-        dA: geodesic distance of each point from each anchor; NaN for points that were not labelled.
+    anchor_m : ndarray (15, a + 2)
+        dA: geodesic distance of each point from each anchor, then its distances to the rim and to the end
+        (`core.hand.fields`); NaN for points that were not labelled.
     pair_m : ndarray (105,)
         dB: geodesic distances between points (`names.PAIRS`); NaN where one of them is missing.
     """
@@ -45,7 +52,7 @@ class LabelledFrame:
 
     @property
     def vector(self) -> FloatArray:
-        """All distances (15 a + 105,) in a row."""
+        """All distances (15 (a + 2) + 105,) in a row."""
         return np.concatenate([self.anchor_m.ravel(), self.pair_m])
 
 
@@ -54,26 +61,26 @@ class ConfigurationModel:
     """Distances of one configuration of the hand.
 
     A frame's distances are ``mean + b @ modes`` and noise, b standard normal: the modes say how hands differ
-    in size, in how the marker sits, and in how far the fingers bend.
+    in size, in how the marker sits, and in how the fingers are held.
 
     Attributes
     ----------
     name : str
-    anchors : int
-        How many anchors, a.
-    mean_m : ndarray (15 a + 105,)
-        dA point by point, then dB pair by pair; NaN for what was never seen twice.
-    sigma_m : ndarray (15 a + 105,)
+    fields : int
+        Distances of a point: of a anchors, and two of its own, f = a + 2.
+    mean_m : ndarray (15 f + 105,)
+        dA point by point, then dB pair by pair; NaN for what was never seen.
+    sigma_m : ndarray (15 f + 105,)
         Standard deviation that the modes leave.
-    modes_m : ndarray (k, 15 a + 105)
-        Each scaled to one standard deviation; 0 where the mean is NaN.
+    modes_m : ndarray (k, 15 f + 105)
+        Each scaled to one standard deviation, the strongest first; 0 where the mean is NaN.
     seen : ndarray (15,)
         Share of the frames in which a point was labelled.
     frames : int
     """
 
     name: str
-    anchors: int
+    fields: int
     mean_m: FloatArray
     sigma_m: FloatArray
     modes_m: FloatArray
@@ -81,52 +88,81 @@ class ConfigurationModel:
     frames: int
 
     def expected(self, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Distances (15, a) and (105,) of a hand with mode coefficients ``b`` (k,)."""
+        """Distances (15, f) and (105,) of a hand with mode coefficients ``b`` (k,)."""
         values = self.mean_m + b @ self.modes_m
-        cut = POINTS * self.anchors
-        return values[:cut].reshape(POINTS, self.anchors), values[cut:]
+        cut = POINTS * self.fields
+        return values[:cut].reshape(POINTS, self.fields), values[cut:]
 
     @property
     def anchor_sigma_m(self) -> FloatArray:
-        """Spread (15, a) of the distances from the anchors."""
-        return self.sigma_m[: POINTS * self.anchors].reshape(POINTS, self.anchors)
+        """Spread (15, f) of the points' distances that the modes leave."""
+        return self.sigma_m[: POINTS * self.fields].reshape(POINTS, self.fields)
 
     @property
     def pair_sigma_m(self) -> FloatArray:
-        """Spread (105,) of the distances between points."""
-        return self.sigma_m[POINTS * self.anchors :]
+        """Spread (105,) of the distances between points that the modes leave."""
+        return self.sigma_m[POINTS * self.fields :]
 
 
-def learn_configuration(name: str, frames: Sequence[LabelledFrame]) -> ConfigurationModel:
+def learn_configuration(
+    name: str, frames: Sequence[LabelledFrame], *, rigid_anchors: bool = True
+) -> ConfigurationModel:
     """Mean, modes and remaining spread of the distances of one configuration.
 
-    The size of the hand is a mode even where the frames show one hand only; the others are principal
-    components, as many as the frames can carry. Missing distances are filled in turn from the model itself.
+    A few frames say little about other people and other days: what is known beforehand (`core.hand.flat`)
+    counts like six frames more, so that many frames overrule it. Missing distances are filled in turn from
+    the model itself.
+
+    Parameters
+    ----------
+    name : str
+    frames : sequence of LabelledFrame
+    rigid_anchors : bool
+        Whether the anchors are the corners of one marker.
 
     Raises
     ------
     InputError
-        If there are too few frames, or no point that two of them show.
+        If there are too few frames, or no point that is labelled in two of them.
     """
     if len(frames) < LEAST_FRAMES:
         raise InputError(
             f"Configuration '{name}' has {len(frames)} labelled frame{'s'[: len(frames) != 1]}.",
-            f"Label at least {LEAST_FRAMES}: one frame shows no spread.",
+            f"Label at least {LEAST_FRAMES}: fewer show no spread.",
         )
     data = np.array([frame.vector for frame in frames])
-    usable = np.isfinite(data).sum(axis=0) >= 2
-    anchors = frames[0].anchor_m.shape[1]
-    if not usable[: POINTS * anchors].any():
+    fields = frames[0].anchor_m.shape[1]
+    known = np.isfinite(data)
+    if not (known[:, : POINTS * fields].sum(axis=0) >= 2).any():
         raise InputError(
             f"Configuration '{name}' has no point that is labelled in two frames.",
             "Label the same points in every frame.",
         )
-    centre = np.where(usable, _nanmean(data), np.nan)
-    modes, rest = _principal(data[:, usable] - centre[usable], centre[usable])
-    sigma, spread = np.full(len(centre), np.nan), np.zeros((len(modes), len(centre)))
-    sigma[usable], spread[:, usable] = np.maximum(rest, _LEAST_SIGMA_M), modes
-    seen = np.isfinite(data[:, : POINTS * anchors]).reshape(len(data), POINTS, anchors).all(axis=2)
-    return ConfigurationModel(name, anchors, centre, sigma, spread, seen.mean(axis=0), len(frames))
+    usable = known.any(axis=0)
+    mean = np.where(usable, _nanmean(data), np.nan)
+    prior, own = _beforehand(mean, fields, rigid_anchors)
+    centre, modes, rest = _factors(data[:, usable], prior[:, usable], own[usable])
+    sigma, spread = np.full(len(mean), np.nan), np.zeros((len(modes), len(mean)))
+    mean[usable], sigma[usable], spread[:, usable] = centre, rest, modes
+    seen = known[:, : POINTS * fields].reshape(len(data), POINTS, fields).all(axis=2)
+    return ConfigurationModel(name, fields, mean, sigma, spread, seen.mean(axis=0), len(frames))
+
+
+def _beforehand(mean: FloatArray, fields: int, rigid_anchors: bool) -> tuple[FloatArray, FloatArray]:
+    """Likely modes (p, 15 f + 105) of such distances, and their own deviations (15 f + 105,)."""
+    anchors = fields - OWN_FIELDS
+    points, pairs = mean[: POINTS * fields].reshape(POINTS, fields), mean[POINTS * fields :]
+    flat = lay_flat(points[:, :anchors], pairs)
+    changes = likely_changes(flat, rigid_anchors=rigid_anchors)
+    modes = np.zeros((len(changes), POINTS, fields))
+    modes[:, :, :anchors] = changes[:, : POINTS * anchors].reshape(-1, POINTS, anchors)
+    modes[0, :, anchors + 1] = SIZE_SHARE * np.nan_to_num(points[:, anchors + 1])
+    own = np.full((POINTS, fields), _SIGMA_M)
+    own[:, anchors], own[:, anchors + 1] = _RIM_SIGMA_M, _END_SIGMA_M
+    return (
+        np.hstack([modes.reshape(len(modes), -1), changes[:, POINTS * anchors :]]),
+        np.concatenate([own.ravel(), np.full(len(pairs), _SIGMA_M)]),
+    )
 
 
 def _nanmean(values: FloatArray) -> FloatArray:
@@ -134,24 +170,43 @@ def _nanmean(values: FloatArray) -> FloatArray:
     return np.asarray(np.nansum(values, axis=0) / np.maximum(count, 1))
 
 
-def _principal(centred: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Modes (k, d) and the standard deviation (d,) of what they leave, of centred data (n, d) with gaps."""
-    count = len(centred)
-    known = np.isfinite(centred)
-    wanted = min(_MOST_MODES, count // _FRAMES_PER_MODE)
-    modes = (_SIZE_SIGMA * mean)[None]
-    filled = np.where(known, centred, 0.0)
-    for _ in range(_ROUNDS if wanted else 0):
-        left, values, right = np.linalg.svd(filled, full_matrices=False)
-        modes = (values[:wanted, None] / np.sqrt(count)) * right[:wanted]
-        filled = np.where(known, centred, (left[:, :wanted] * values[:wanted]) @ right[:wanted])
-    weight = np.full(centred.shape[1], _MEASURED_SIGMA_M**-2)
-    fitted = np.array([coefficients(row, modes, weight) @ modes for row in centred])
-    freedom = max(1.0 - len(modes) / count, 0.3)
-    return modes, np.sqrt(_nanmean(np.where(known, centred - fitted, np.nan) ** 2) / freedom)
+def _factors(data: FloatArray, prior: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean (d,), modes (k, d) and remaining deviation (d,) of data (n, d) with gaps (factor analysis).
+
+    Parameters
+    ----------
+    data : ndarray (n, d)
+    prior : ndarray (p, d)
+        Modes that are likely beforehand.
+    own : ndarray (d,)
+        Deviation beside them.
+    """
+    count = len(data)
+    known = np.isfinite(data)
+    mean = _nanmean(data)
+    before = prior.T @ prior + np.diag(own**2)
+    modes, rest = _split(before)
+    for _ in range(_ROUNDS):
+        fitted = np.array([mean + coefficients(row - mean, modes, 1.0 / rest**2) @ modes for row in data])
+        filled = np.where(known, data, fitted)
+        mean = filled.mean(axis=0)
+        spread = (filled - mean).T @ (filled - mean)
+        modes, rest = _split((spread + _PRIOR_FRAMES * before) / (count - 1 + _PRIOR_FRAMES))
+    return mean, modes, rest
 
 
-def coefficients(differences: FloatArray, modes: FloatArray, weight: FloatArray) -> FloatArray:
+def _split(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Strongest modes (k, d) of a covariance, and the deviation (d,) that they leave."""
+    values, vectors = np.linalg.eigh(covariance)
+    strongest = slice(-1, -1 - _MODES, -1)
+    modes = np.sqrt(np.maximum(values[strongest], 0.0))[:, None] * vectors[:, strongest].T
+    rest = np.diag(covariance) - (modes**2).sum(axis=0)
+    return modes, np.sqrt(np.maximum(rest, _LEAST_SIGMA_M**2))
+
+
+def coefficients(
+    differences: FloatArray, modes: FloatArray, weight: FloatArray, before: FloatArray | None = None
+) -> FloatArray:
     """Most probable mode coefficients (k,) of differences (d,) from the mean; NaN does not count.
 
     Parameters
@@ -161,8 +216,11 @@ def coefficients(differences: FloatArray, modes: FloatArray, weight: FloatArray)
     modes : ndarray (k, d)
     weight : ndarray (d,)
         Inverse variances.
+    before : ndarray (k,), optional
+        What they are expected to be; 0 by default.
     """
     known = np.isfinite(differences) & np.isfinite(weight)
     basis, w = modes[:, known], weight[known]
     normal = (basis * w) @ basis.T + np.eye(len(modes))
-    return np.asarray(np.linalg.solve(normal, (basis * w) @ differences[known]))
+    right = (basis * w) @ differences[known]
+    return np.asarray(np.linalg.solve(normal, right if before is None else right + before))
