@@ -103,6 +103,20 @@ def test_a_follower_finds_a_hand_that_has_jumped_in_the_same_picture(frame) -> N
         follower.close()
 
 
+def test_a_new_hand_is_looked_at_twice_and_a_followers_memory_can_be_cleared(frame) -> None:
+    follower = HandFollower()
+    try:
+        picture = frame.capture.color
+        first = follower.detect(picture)
+        # the landmarks have settled with the first answer
+        settled = follower.detect(picture)
+        assert np.median(np.linalg.norm(first.pixels - settled.pixels, axis=1)) < 1.5
+        follower.forget()
+        np.testing.assert_allclose(follower.detect(picture).pixels, first.pixels, atol=1e-3)
+    finally:
+        follower.close()
+
+
 def test_it_says_nothing_on_the_command_line_and_leaves_cleanly() -> None:
     done = in_a_fresh_interpreter()
     assert done.returncode == 0
