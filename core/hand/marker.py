@@ -132,6 +132,8 @@ def _detector(dictionary: str, thorough: bool) -> Any:
     parameters.polygonalApproxAccuracyRate = 0.05
     parameters.minMarkerPerimeterRate = 0.02
     parameters.errorCorrectionRate = 1.0
+    # the rim's outline must not hide the black square's within it
+    parameters.minMarkerDistanceRate = 0.02
     return cv2.aruco.ArucoDetector(_dictionary(dictionary), parameters)
 
 
