@@ -49,7 +49,7 @@ class Occluded:
         # in the frame of the hand that is hidden: y toward its fingertips, z toward the camera
         point_back = RigidTransform(np.diag([-1.0, -1.0, 1.0]), np.array([0.0, 0.85 * reach, 0.0]))
         lying = RigidTransform(rotation_about((1, 0, 0), -np.pi / 2), np.array([0.0, 0.25 * reach, 0.0]))
-        begin = RigidTransform(np.eye(3), np.array([0.0, 0.30 * reach, 0.0]))
+        begin = RigidTransform(np.eye(3), np.array([0.0, 0.24 * reach, 0.0]))
         self._passing: list[tuple[str, Thing]] = [
             ("a bar", placed(bar(), begin)),
             ("another hand", other_hand(self.model.body.shape, other, self.tone, hand=point_back)),

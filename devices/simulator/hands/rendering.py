@@ -300,7 +300,7 @@ class HandScene:
         place = _mixed(weights, view.model.reference.astype(np.float32), corners)
         waves = np.sin(place @ _GRAIN)
         grain = 1.0 + 0.05 * waves[:, :1] * waves[:, 1:]
-        albedo = np.asarray(linear(TONES[view.tone]).astype(np.float32) * grain)
+        albedo = np.asarray(linear(TONES[view.tone]) * grain, np.float32)
         printed = np.zeros(len(place), np.bool_)
         on_back = np.flatnonzero(place[:, 2] > _BACK_M)
         for sheet in view.markers:

@@ -3,7 +3,8 @@
 What is made up, and simpler than nature
 ----------------------------------------
 The skin follows the finger bones by linear blend skinning: no tendons, no nails, no wrinkles, and bent
-fingers lose some volume. The marker is printed on the skin and bends with it, it is not a flat sheet. Light
+fingers lose some volume. The marker is printed on the skin, straight from above, and bends with it: it is not
+a stiff card, and where the back of the hand slopes it is stretched by a few percent. Light
 comes from one lamp and from the camera's side; nothing shades anything else and no light goes from thing to
 thing. Depth and colour are taken at the same moment; motion blurs the colour picture as a whole, along the
 motion of the back of the hand, and the depth frame not at all. Fingers and things are rigid where they
