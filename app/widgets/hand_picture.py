@@ -201,9 +201,13 @@ class HandPicture(PhotoView):
         font.setWeight(QFont.Weight.DemiBold)
         painter.setFont(font)
         metrics = painter.fontMetrics()
-        for name, place in at.items():
+        taken: list[QRectF] = []
+        for name, place in sorted(at.items(), key=lambda item: item[1].y()):
             text = short_name(name)
             box = QRectF(place.x() + 8, place.y() - 9, metrics.horizontalAdvance(text) + 8, 17)
+            while any(box.intersects(other) for other in taken):
+                box.translate(0.0, 4.0)
+            taken.append(box)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(255, 255, 255, 215))
             painter.drawRoundedRect(box, 4, 4)

@@ -73,6 +73,7 @@ class HandEngine(QObject):
         self._orders: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._ticks: Newest[Tick] = Newest()
         self._thread: threading.Thread | None = None
+        self._sought = -1
         # used by the thread alone
         self._row: HandRow | None = None
         self._camera: LiveCamera | None = None
@@ -147,9 +148,12 @@ class HandEngine(QObject):
         self._order(order)
 
     def seek(self, number: int) -> None:
-        """Show a frame of a recording."""
+        """Show a frame of a recording; of several asked for, the last."""
+        self._sought = number
 
         def order() -> None:
+            if number != self._sought:
+                return
             if self._row is not None and 0 <= number < self._row.count and number != self._index:
                 self._due_s = time.monotonic()
                 self._show_number(number)
@@ -171,6 +175,7 @@ class HandEngine(QObject):
             self._model, self._settings = model, settings
             self._finders.clear()
             self._tracker = None
+            self.log.clear()
             self._look_again()
 
         self._order(order)

@@ -177,6 +177,11 @@ class TrainPanel(QWidget):
         self.counts.setToolTip(self.counts.text())
         self.learn.setEnabled(bool(counts))
 
+    def warn(self, sentence: str) -> None:
+        """Say why a click was not taken, until the next one."""
+        self.next.setText(sentence)
+        self.next.setStyleSheet(f"color: {palette.AMBER}; font-weight: 600;")
+
     def set_proposing(self, on: bool) -> None:
         """Whether there is a model that could propose points."""
         self.propose.setVisible(on)
@@ -228,7 +233,10 @@ class TrainPanel(QWidget):
             text = "All points are there. Drag one to correct it, then save."
         else:
             text = "This frame is labelled and saved. Drag a point to correct it."
+        if lab.proposed:
+            text = f"{len(lab.proposed)} points are proposed. Drag those that are wrong, then save the frame."
         self.next.setText(text)
+        self.next.setStyleSheet("")
 
     def _on_row(self, row: int) -> None:
         if row >= 0:

@@ -182,10 +182,9 @@ class Training(QObject):
         self._tell(self.labelling.move(name, u, v))
 
     def _tell(self, refused: str) -> None:
+        """Beside the list and not in the banner, which would push the picture from under the mouse."""
         if refused:
-            self._banner.show_warning(refused)
-        elif self._banner.kind == "warning":
-            self._banner.clear()
+            self.panel.warn(refused)
 
     @Slot()
     def propose(self) -> None:
@@ -202,11 +201,8 @@ class Training(QObject):
         if count:
             if answer.configuration and not self.panel.name():
                 self.panel.set_name(answer.configuration)
-            self._banner.show_info(
-                f"{count} points are proposed.", "Drag those that are wrong, then save the frame."
-            )
         else:
-            self._banner.show_warning("The model finds no further point here.", answer.reason or "")
+            self.panel.warn(f"The model finds no further point here. {answer.reason or ''}".strip())
 
     # --- files -------------------------------------------------------------------------------------------
 
@@ -236,8 +232,7 @@ class Training(QObject):
             return False
         self._last_name = self.panel.stored_name = name
         self.labelling.stored()
-        self.refresh_counts()
-        self._banner.show_success(f"Saved as {folder.name}.")
+        self.refresh_counts(f"Saved as {folder.name}")
         return True
 
     @Slot()
@@ -253,8 +248,8 @@ class Training(QObject):
         self.dataset = HandDataset(Path(path))
         return True
 
-    def refresh_counts(self) -> None:
-        """Show what the dataset holds."""
+    def refresh_counts(self, saved: str = "") -> None:
+        """Show what the dataset holds, and what was saved just now."""
         counts: dict[str, int] | None = None
         if self.dataset is not None:
             try:
@@ -262,7 +257,7 @@ class Training(QObject):
             except GeodermError as error:
                 self._banner.show_error(error.message, error.advice)
                 counts = {}
-        title = "No folder chosen" if self.dataset is None else "Labelled frames"
+        title = "No folder chosen" if self.dataset is None else saved or "Labelled frames"
         self.panel.set_counts(title, counts, can_choose=self._source_folder is None)
 
     # --- learning ----------------------------------------------------------------------------------------

@@ -47,14 +47,19 @@ class WatchPanel(QWidget):
         self.points = RowTable(
             [
                 Column("Point"),
-                Column("Sure", 66, number=True),
-                Column("Error mm", 88, number=True),
-                Column("x, y, z mm", 146, number=True),
+                Column("Sure", 62, number=True),
+                Column("Error mm", 80, number=True),
+                Column("x, y, z mm", 116, number=True),
             ]
         )
         self.points.setObjectName("hand_points")
         self.points.setAccessibleName("Points of the frame")
-        self.points.verticalHeader().setDefaultSectionSize(30)
+        self.points.verticalHeader().setDefaultSectionSize(26)
+        self.points.horizontalHeader().setMinimumSectionSize(40)
+        self.points.setStyleSheet(
+            "QTableView { font-size: 14px; } QTableView::item { padding: 0 4px; }"
+            "QHeaderView::section { padding: 0 6px; }"
+        )
         self.pages = QStackedWidget()
         distances = QWidget()
         column = QVBoxLayout(distances)
@@ -63,7 +68,11 @@ class WatchPanel(QWidget):
         column.addWidget(self.chart)
         column.addWidget(self.pairs, 1)
         self.pages.addWidget(distances)
-        self.pages.addWidget(self.points)
+        listed = QWidget()
+        inner = QVBoxLayout(listed)
+        inner.setContentsMargins(12, 4, 4, 4)
+        inner.addWidget(self.points)
+        self.pages.addWidget(listed)
         self.segments = Segments(
             "hand_show", (("distances", "Distances"), ("points", "Points")), self.show_page
         )
@@ -178,7 +187,7 @@ def point_rows(answer: HandAnswer | None) -> list[Row]:
     """Rows of the table of points."""
     rows = []
     for k, name in enumerate(POINT_NAMES):
-        cells = (spoken(name).capitalize(), "", "–", "–")
+        cells = (spoken(name).capitalize(), "–", "–", "–")
         state = "hidden"
         if answer is not None:
             error = "–" if not np.isfinite(answer.error_m[k]) else f"{1000 * answer.error_m[k]:.1f}"
@@ -188,7 +197,7 @@ def point_rows(answer: HandAnswer | None) -> list[Row]:
                 place = f"{x:.0f}, {y:.0f}, {z:.0f}"
                 cells = (cells[0], f"{answer.confidence[k]:.0%}", error, place)
             else:
-                cells = (cells[0], "not told", error, "–")
+                cells = (cells[0], "–", error, "–")
         colors = {} if state != "hidden" else dict.fromkeys(range(4), palette.FAINT)
         rows.append(Row(name, cells, colors))
     return rows

@@ -285,6 +285,9 @@ class HandWindow(QWidget):
     @Slot(int)
     def _seek(self, number: int) -> None:
         self._unless_unsaved(lambda: self.engine.seek(number))
+        shot = self.training.labelling.shot
+        if self.training.active and self.training.labelling.unsaved and shot is not None:
+            self.transport.show_place(shot.number, shot.time_s)
 
     @Slot()
     def _after_save(self) -> None:
