@@ -88,22 +88,22 @@ def find_markers(
         if min(rgb.shape[:2]) < _LEAST_SIDE_PX:
             return []
     gray = np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY))
-    found = _search(gray, dictionary, thorough=False)
+    found = _search(gray, dictionary, thorough=False, all_of_them=near_px is None)
     if not found and effort == "thorough":
-        found = _search(gray, dictionary, thorough=True)
+        found = _search(gray, dictionary, thorough=True, all_of_them=True)
     moved = [SeenMarker(m.number, m.corners_px + np.array([left, top])) for m in found]
     return sorted(moved, key=lambda marker: -marker.side_px)
 
 
-def _search(gray: GrayImage, dictionary: str, *, thorough: bool) -> list[SeenMarker]:
-    """Markers; if ArUco can read none, squares are read on the bent patch that their sides span."""
+def _search(gray: GrayImage, dictionary: str, *, thorough: bool, all_of_them: bool) -> list[SeenMarker]:
+    """Markers; squares that ArUco could not read are read on the bent patch, ``all_of_them`` or if needed."""
     corners, numbers, rejected = _detector(dictionary, thorough).detectMarkers(gray)
     found: list[SeenMarker] = []
     for square, number in zip(corners, () if numbers is None else np.ravel(numbers), strict=True):
         given = np.asarray(square, float).reshape(4, 2)
         outline = trace_outline(gray, given)
         found.append(SeenMarker(int(number), given if outline is None else outline.corners_px))
-    if found:
+    if found and not all_of_them:
         return found
     for outline in _outlines(gray, rejected):
         seen = _read(gray, outline, dictionary)
