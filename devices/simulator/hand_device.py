@@ -71,7 +71,6 @@ class SimulatedHandCamera(OpenedByWith):
         self._problem: WorkError | None = None
         self._opened = False
         self._first_s = 0.0
-        self._shown = 0
         self._last: LiveFrame | None = None
         self._truth: OrderedDict[int, FrameLabels] = OrderedDict()
 
@@ -133,19 +132,22 @@ class SimulatedHandCamera(OpenedByWith):
         return self._truth.get(number)
 
     def open(self) -> None:
-        """Let the hand come; the first frame is there after a second or two."""
+        """Let the hand come. Nothing is drawn before somebody looks."""
         if self._opened:
             return
+        self._problem, self._show, self._last = None, None, None
+        self._opened = True
+        self.start()
+
+    def _draw(self) -> None:
+        """Start the drawing process; the first frame is there after a second or two."""
         from devices.simulator.hands.live_loop import serve
 
-        self._problem, self._show, self._last, self._shown = None, None, None, 0
         self._drawer = ChildProcess(serve, "geoderm-hand", self._plan)
-        self._opened = True
         self._reader = threading.Thread(
             target=self._read, args=(self._drawer,), name="simulated-hand", daemon=True
         )
         self._reader.start()
-        self.start()
 
     def start(self, streams: Collection[StreamKind] = DEFAULT_STREAMS) -> None:
         """Stream these kinds from now on, counted from frame 1."""
@@ -156,7 +158,7 @@ class SimulatedHandCamera(OpenedByWith):
         self._check()
         with self._change:
             self._streams = frozenset(streams)
-            self._first_s, self._shown, self._last = time.monotonic(), 0, None
+            self._first_s, self._last = time.monotonic(), None
             self._truth.clear()
 
     def _read(self, drawer: ChildProcess) -> None:
@@ -193,6 +195,8 @@ class SimulatedHandCamera(OpenedByWith):
         with self._change:
             while True:
                 self._check()
+                if self._drawer is None:
+                    self._draw()
                 now = time.monotonic()
                 wait = until - now
                 if self._show is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from collections.abc import Iterator
 
@@ -22,6 +23,10 @@ from devices.simulator.hands.shots import Holder
 def camera() -> Iterator[SimulatedHandCamera]:
     with SimulatedHandCamera(LoopPlan(Holder(seed=1), seconds=1.0)) as opened:
         yield opened
+
+
+def drawing() -> set[int | None]:
+    return {process.pid for process in multiprocessing.active_children() if process.name == "geoderm-hand"}
 
 
 def next_frame(camera: SimulatedHandCamera, after: int = 0) -> LiveFrame:
@@ -108,10 +113,15 @@ def test_a_burst_is_a_capture_of_this_sensor(camera: SimulatedHandCamera) -> Non
 
 def test_a_closed_camera_says_so_and_its_process_is_gone() -> None:
     camera = SimulatedHandCamera(LoopPlan(Holder(), seconds=1.0))
+    before = drawing()
     with pytest.raises(WorkError, match="closed"):
         camera.latest()
     camera.open()
+    assert drawing() == before  # nobody has looked yet
+    camera.latest(0, 0.05)
+    assert len(drawing() - before) == 1
     camera.close()
+    assert drawing() <= before
     camera.close()
     assert camera.state is LiveState.CLOSED
     with pytest.raises(WorkError, match="closed"):
