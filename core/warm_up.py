@@ -12,6 +12,7 @@ def warm_up() -> float:
     second or two later on, when they are loaded. For set-up or a background thread, never for a click.
     """
     from core.geodesics import warm_up as warm_up_geodesics
+    from core.hand.warm_up import warm_up as warm_up_hand
     from core.relocation.warm_up import warm_up as warm_up_relocation
     from core.surface import warm_up as warm_up_surface
 
@@ -19,6 +20,7 @@ def warm_up() -> float:
     warm_up_surface()
     warm_up_geodesics()
     warm_up_relocation()
+    warm_up_hand()
     return time.perf_counter() - started
 
 

@@ -82,7 +82,7 @@ def rim_distance(surface: BodySurface) -> FloatArray:
     inner = np.zeros(vertex.shape, np.uint8)
     inner[surface.pixels[:, 1], surface.pixels[:, 0]] = ~surface.boundary
     pixels = cv2.distanceTransform(inner, cv2.DIST_L2, 5)[surface.pixels[:, 1], surface.pixels[:, 0]]
-    return np.minimum(pixels * surface.vertices[:, 2] / surface.camera.fx, _MOST_RIM_M)
+    return np.asarray(np.minimum(pixels * surface.vertices[:, 2] / surface.camera.fx, _MOST_RIM_M))
 
 
 def end_distance(surface: BodySurface, away_m: FloatArray) -> FloatArray:

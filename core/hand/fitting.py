@@ -38,6 +38,7 @@ _MOVED_M = 0.002
 _TAIL = 4.0
 _REACH_M = 0.008
 _NEAR_CAP = 9.0
+_STRAIGHT = 0.8
 _OWN_CAP = 6.0
 _QUICK_OWN_CAP = 30.0
 
@@ -53,11 +54,14 @@ class Hint:
     near_m : ndarray (15, 3)
         Where points are expected, NaN if not known.
     near_sigma_m : float
+    trust : float
+        Inverse variance of the coefficients.
     """
 
     b: FloatArray
     near_m: FloatArray
     near_sigma_m: float = 0.02
+    trust: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,10 @@ class HandFit:
         How far the places reach that are about as likely.
     cost : ndarray (15,)
         Of each point's place, NaN where absent.
+    end_error_m : ndarray (15,)
+        How much more skin there is beyond the point than by the model, NaN where absent.
+    unexplained_m : float
+        How far skin goes on beyond the points, away from the anchors.
     pair_m, expected_pair_m : ndarray (105,)
         Distances between the points, measured and by the model.
     b : ndarray (k,)
@@ -92,6 +100,8 @@ class HandFit:
     pair_error_m: FloatArray
     spread_m: FloatArray
     cost: FloatArray
+    end_error_m: FloatArray
+    unexplained_m: float
     pair_m: FloatArray
     expected_pair_m: FloatArray
     b: FloatArray
@@ -133,10 +143,12 @@ class _Search:
     ) -> None:
         self._model = model
         self._vertices = np.ascontiguousarray(vertices)
-        self._distances = np.ascontiguousarray(distances)
+        missing = np.asarray(np.isnan(distances).all(axis=1))
+        self._distances = np.ascontiguousarray(np.where(missing[:, None], 0.0, distances))
         self._hint = hint
         variance = model.anchor_sigma_m**2 + _MEASURED_SIGMA_M**2
-        self._weight = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
+        self._weight = np.where(np.isfinite(variance) & ~missing, 1.0 / variance, 0.0)
+        self._missing = missing
         self._likely = (model.seen > _SELDOM) & (self._weight > 0).any(axis=1)
         variance = model.sigma_m**2 + _MEASURED_SIGMA_M**2
         self._inverse = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
@@ -247,12 +259,28 @@ class _Search:
         measured = np.full((POINTS, model.fields), np.nan)
         there = vertex >= 0
         measured[there] = self._distances[:, vertex[there]].T
+        measured[:, self._missing] = np.nan
         measured[~np.isfinite(measured)] = np.nan
         difference = np.concatenate([measured.ravel(), pair_m]) - model.mean_m
         for _ in range(2):
             off = (difference - b @ model.modes_m) ** 2 * self._inverse
-            b = coefficients(difference, model.modes_m, self._inverse / (1.0 + np.nan_to_num(off) / _TAIL))
+            weight = self._inverse / (1.0 + np.nan_to_num(off) / _TAIL)
+            if self._hint is None:
+                b = coefficients(difference, model.modes_m, weight)
+            else:
+                b = coefficients(difference, model.modes_m, weight, self._hint.b, self._hint.trust)
         return b
+
+    def _unexplained(self, fields: FloatArray, vertex: IntArray) -> float:
+        """Largest distance from all points of skin that lies straight beyond one of them."""
+        if len(vertex) == 0:
+            return 0.0
+        away = self._distances[:-OWN_FIELDS][~self._missing[:-OWN_FIELDS]].mean(axis=0)
+        with np.errstate(invalid="ignore"):
+            beyond = (away[None] - away[vertex, None] >= _STRAIGHT * fields).any(axis=0)
+        nearest = fields.min(axis=0)
+        reached = beyond & np.isfinite(nearest)
+        return float(nearest[reached].max()) if reached.any() else 0.0
 
     def _answer(
         self,
@@ -266,20 +294,21 @@ class _Search:
         from core.hand.fit_kernels import weighted_place
 
         points = np.full((POINTS, 3), np.nan)
-        anchor_error, spread, cost = (np.full(POINTS, np.nan) for _ in range(3))
+        anchor_error, spread, cost, end = (np.full(POINTS, np.nan) for _ in range(4))
         expected, expected_pair = self._model.expected(b)
         for p in np.flatnonzero(chosen):
             v = int(vertex[p])
             *place, spread[p] = weighted_place(total[p], self._vertices, v, _REACH_M)
             points[p] = place
             cost[p] = total[p, v]
-            off = (self._distances[:, v] - expected[p])[:-OWN_FIELDS]
-            anchor_error[p] = np.sqrt(np.nanmean(off**2))
+            off = self._distances[:, v] - expected[p]
+            anchor_error[p] = np.sqrt(np.nanmean(off[:-OWN_FIELDS][~self._missing[:-OWN_FIELDS]] ** 2))
+            end[p] = off[-1]
         pair = self._pairs(fields, vertex, chosen)
         off = np.abs(pair - expected_pair)
         pair_error = np.full(POINTS, np.nan)
         for p in np.flatnonzero(chosen):
-            own = off[(_I == p) | (_J == p)]
+            own = off[(p == _I) | (p == _J)]
             if np.isfinite(own).any():
                 pair_error[p] = np.nanmedian(own)
         return HandFit(
@@ -290,6 +319,8 @@ class _Search:
             pair_error,
             spread,
             cost,
+            end,
+            self._unexplained(fields[chosen], vertex[chosen]),
             pair,
             np.where(np.isfinite(pair), expected_pair, np.nan),
             b,

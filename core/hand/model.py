@@ -170,7 +170,9 @@ def _nanmean(values: FloatArray) -> FloatArray:
     return np.asarray(np.nansum(values, axis=0) / np.maximum(count, 1))
 
 
-def _factors(data: FloatArray, prior: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _factors(
+    data: FloatArray, prior: FloatArray, own: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean (d,), modes (k, d) and remaining deviation (d,) of data (n, d) with gaps (factor analysis).
 
     Parameters
@@ -205,7 +207,11 @@ def _split(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def coefficients(
-    differences: FloatArray, modes: FloatArray, weight: FloatArray, before: FloatArray | None = None
+    differences: FloatArray,
+    modes: FloatArray,
+    weight: FloatArray,
+    before: FloatArray | None = None,
+    trust: float = 0.0,
 ) -> FloatArray:
     """Most probable mode coefficients (k,) of differences (d,) from the mean; NaN does not count.
 
@@ -217,10 +223,14 @@ def coefficients(
     weight : ndarray (d,)
         Inverse variances.
     before : ndarray (k,), optional
-        What they are expected to be; 0 by default.
+        What they were in the frame before.
+    trust : float
+        Inverse variance of that; each coefficient's own is 1.
     """
     known = np.isfinite(differences) & np.isfinite(weight)
     basis, w = modes[:, known], weight[known]
     normal = (basis * w) @ basis.T + np.eye(len(modes))
     right = (basis * w) @ differences[known]
-    return np.asarray(np.linalg.solve(normal, right if before is None else right + before))
+    if before is not None:
+        normal, right = normal + trust * np.eye(len(modes)), right + trust * before
+    return np.asarray(np.linalg.solve(normal, right))

@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from core.capture.rgbd import CameraRig
-from core.errors import WorkError
-from core.geodesics import geodesic_solver
-from core.hand.anchors import AnchorFinder
+from core.capture.transform import RigidTransform
+from core.errors import InputError, WorkError
+from core.hand.anchors import AnchorFinder, FoundAnchors
 from core.hand.answer import HandAnswer
-from core.hand.fitting import fit_configuration
+from core.hand.fields import HandFields, measure_fields
+from core.hand.fitting import HandFit, Hint, fit_configuration
+from core.hand.following import LastSeen, follow, motion_between
 from core.hand.hand_model import HandModel
-from core.hand.surface import cut_hand
+from core.hand.judging import Verdict, judge, misfit
+from core.hand.names import PAIRS
+from core.hand.sequential import fit_sequentially
+from core.hand.surface import HandSurface, cut_hand
 
 FloatArray = NDArray[np.float64]
 
 Refinement = Literal["joint", "sequential"]
+
+FULL_CONFIDENCE_M = 0.008
+"""A point whose distances disagree by this much has a confidence of 0.6."""
+
+_DOUBT = 4.0
+_WORSE = 1.6
+_USUAL = 0.8
+_LOOK_ROUND = 6
+_UNSURE_SHARE, _FOLLOWED_SHARE = 0.6, 0.8
 
 
 @dataclass(frozen=True)
@@ -44,6 +61,22 @@ class TrackingOptions:
     configuration: str | None = None
 
 
+@dataclass(eq=False)
+class _Past:
+    """What is remembered of the frames before."""
+
+    configuration: str | None = None
+    b: dict[str, FloatArray] = field(default_factory=dict)
+    points_m: FloatArray | None = None
+    anchors_m: FloatArray | None = None
+    last: LastSeen | None = None
+    motion: RigidTransform = field(default_factory=RigidTransform)
+    step: RigidTransform = field(default_factory=RigidTransform)
+    lost: int = 0
+    usual_misfit: float = 0.0
+    since_round: int = 0
+
+
 class HandTracker:
     """Follows one hand. `track` is called with frames in their order; not thread safe.
 
@@ -54,6 +87,11 @@ class HandTracker:
     finder : AnchorFinder
         Of the kind that the model was learned with (`core.hand.finders.finder_for`).
     options : TrackingOptions, optional
+
+    Raises
+    ------
+    InputError
+        If the options name a configuration that was not learned.
     """
 
     def __init__(
@@ -61,9 +99,18 @@ class HandTracker:
     ) -> None:
         self._model, self._rig, self._finder = model, rig, finder
         self._options = options or TrackingOptions()
+        known = self._options.configuration
+        if known is not None and known not in model.configurations:
+            raise InputError(
+                f"The model has no configuration '{known}'.",
+                f"It has learned: {', '.join(model.configurations)}.",
+            )
+        self._past = _Past()
+        self._times: dict[str, float] = {}
 
     def reset(self) -> None:
         """Forget the frames before: the next one is the first."""
+        self._past = _Past()
 
     def track(self, depth_m: FloatArray, rgb: NDArray[np.uint8] | None) -> HandAnswer:
         """Find the points in the next frame.
@@ -74,28 +121,151 @@ class HandTracker:
             Metres, 0 for no measurement.
         rgb : ndarray (h', w', 3) uint8 or None
         """
-        anchors = self._finder.find(rgb, depth_m, self._rig)
-        if not anchors.seen:
-            return HandAnswer(reason=anchors.reason)
+        self._times = {}
+        with self._timed("anchors"):
+            anchors, followed = self._anchors(depth_m, rgb)
+        if not np.isfinite(anchors.places_m).all(axis=1).any():
+            return self._nothing(anchors.reason or "The hand was not found.", anchors)
         try:
-            hand = cut_hand(depth_m, self._rig.depth, anchors.places_m, step_px=2)
+            with self._timed("surface"):
+                hand = cut_hand(depth_m, self._rig.depth, anchors.places_m)
         except WorkError as error:
-            return HandAnswer(marker_seen=True, reason=str(error), anchors_m=anchors.places_m)
-        surface = hand.surface
-        solver = geodesic_solver(surface.vertices, surface.triangles)
-        distances = solver.distances(surface.nearest(anchors.places_m))
-        fits = [
-            fit_configuration(model, surface.vertices, distances, solver)
-            for model in self._model.configurations.values()
-        ]
-        best = min(fits, key=lambda fit: fit.cost)
-        return HandAnswer(
-            configuration=best.configuration,
-            points_m=best.points_m,
-            pixels=self._rig.project_to_picture(best.points_m),
-            confidence=np.where(np.isfinite(best.anchor_error_m), 0.5, 0.0),
-            error_m=best.anchor_error_m,
-            anchors_m=anchors.places_m,
-            marker_seen=True,
-            surface=hand,
+            return self._nothing(str(error), anchors)
+        if hand.touching is not None:
+            return replace(self._nothing(hand.touching, anchors), surface=hand)
+        with self._timed("distances"):
+            fields = measure_fields(hand, anchors.places_m)
+        verdict, fit = self._fit(fields, motion_between(self._before(anchors), anchors.places_m))
+        with self._timed("answer"):
+            return self._answer(anchors, followed, hand, fields, verdict, fit)
+
+    def _before(self, anchors: FoundAnchors) -> FloatArray:
+        before = self._past.anchors_m
+        return np.full(anchors.places_m.shape, np.nan) if before is None else before
+
+    @contextmanager
+    def _timed(self, step: str) -> Iterator[None]:
+        begun = time.perf_counter()
+        yield
+        self._times[step] = self._times.get(step, 0.0) + time.perf_counter() - begun
+
+    def _anchors(self, depth_m: FloatArray, rgb: NDArray[np.uint8] | None) -> tuple[FoundAnchors, bool]:
+        """Anchors by the finder, or by the surface of the last frame that had them; and which."""
+        past = self._past
+        near = past.anchors_m if past.lost == 0 else None
+        found = self._finder.find(rgb, depth_m, self._rig, near)
+        if found.seen:
+            return found, False
+        past.lost += 1
+        if past.last is None or past.lost > self._options.lost_frames:
+            if past.last is not None:
+                said = (
+                    f"{found.reason or 'The marker is lost.'} It has been lost for too long to be followed."
+                )
+                self.reset()
+                return FoundAnchors(found.places_m, False, said), False
+            return found, False
+        guess = RigidTransform(
+            past.step.rotation @ past.motion.rotation, past.step.apply(past.motion.translation)
         )
+        motion = follow(past.last, depth_m, self._rig.depth, guess)
+        if motion is None:
+            return FoundAnchors(found.places_m, False, found.reason), False
+        frames = "frame" if past.lost == 1 else f"{past.lost} frames"
+        said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand since {frames}."
+        places = motion.apply(past.last.anchors_m)
+        past.motion = motion
+        return FoundAnchors(places, False, said), True
+
+    def _fit(self, fields: HandFields, moved: RigidTransform) -> tuple[Verdict, HandFit]:
+        """Points and configuration; all configurations are tried where there is a doubt."""
+        past, options = self._past, self._options
+        models = self._model.configurations
+        fits: dict[str, HandFit] = {}
+        current = options.configuration or past.configuration
+        if current is not None:
+            with self._timed("points"):
+                fits[current] = self._fit_one(current, fields, moved)
+            worse = misfit(models[current], fits[current])
+            doubtful = worse > _WORSE * past.usual_misfit + _DOUBT
+            past.since_round += 1
+            if options.configuration is None and not doubtful and past.since_round <= _LOOK_ROUND:
+                past.usual_misfit += (1.0 - _USUAL) * (worse - past.usual_misfit)
+                known = Verdict(current, current, {current: 1.0}, {current: worse})
+                return known, fits[current]
+        if options.configuration is None:
+            with self._timed("configuration"):
+                for name in models:
+                    if name not in fits:
+                        fits[name] = self._fit_one(name, fields, moved)
+            past.since_round = 0
+        verdict = judge(models, self._model.tree, fits)
+        if verdict.configuration is not None and verdict.configuration != past.configuration:
+            past.usual_misfit = verdict.misfit[verdict.configuration]
+        past.configuration = verdict.configuration
+        return verdict, fits[verdict.best]
+
+    def _fit_one(self, name: str, fields: HandFields, moved: RigidTransform) -> HandFit:
+        past = self._past
+        hint = None
+        if name == past.configuration and name in past.b and past.points_m is not None:
+            hint = Hint(past.b[name], moved.apply(past.points_m))
+        fit = fit_configuration if self._options.refinement == "joint" else fit_sequentially
+        return fit(
+            self._model.configurations[name], fields.surface.vertices, fields.values_m, fields.solver, hint
+        )
+
+    def _answer(
+        self,
+        anchors: FoundAnchors,
+        followed: bool,
+        hand: HandSurface,
+        fields: HandFields,
+        verdict: Verdict,
+        fit: HandFit,
+    ) -> HandAnswer:
+        error = np.fmax(fit.anchor_error_m, fit.pair_error_m)
+        told = np.isfinite(fit.points_m).all(axis=1) & (error <= self._options.threshold_m)
+        points = np.where(told[:, None], fit.points_m, np.nan)
+        confidence = np.where(told, np.exp(-0.5 * (np.nan_to_num(error) / FULL_CONFIDENCE_M) ** 2), 0.0)
+        if verdict.configuration is None:
+            confidence = confidence * _UNSURE_SHARE
+        if followed:
+            confidence = confidence * _FOLLOWED_SHARE
+        past = self._past
+        past.b[verdict.best] = fit.b
+        past.points_m = np.where(np.isfinite(points), points, np.nan)
+        past.step = motion_between(self._before(anchors), anchors.places_m)
+        past.anchors_m = anchors.places_m
+        if not followed:
+            past.lost, past.motion = 0, RigidTransform()
+            past.last = LastSeen.of(hand.surface, anchors.places_m)
+        i, j = np.array(PAIRS).T
+        both = told[i] & told[j]
+        return HandAnswer(
+            configuration=verdict.configuration,
+            points_m=points,
+            pixels=self._rig.project_to_picture(points),
+            confidence=confidence,
+            error_m=error,
+            anchors_m=fields.anchors_m,
+            marker_seen=anchors.seen,
+            reason=self._reason(anchors, verdict),
+            pair_m=np.where(both, fit.pair_m, np.nan),
+            expected_pair_m=np.where(both, fit.expected_pair_m, np.nan),
+            likelihood=dict(verdict.likelihood),
+            surface=hand,
+            times_s=dict(self._times),
+        )
+
+    def _nothing(self, reason: str, anchors: FoundAnchors) -> HandAnswer:
+        """No point can be told."""
+        return HandAnswer(
+            anchors_m=anchors.places_m, marker_seen=anchors.seen, reason=reason, times_s=dict(self._times)
+        )
+
+    def _reason(self, anchors: FoundAnchors, verdict: Verdict) -> str | None:
+        said = [anchors.reason] if anchors.reason is not None else []
+        if verdict.configuration is None:
+            said.append("The hand is in none of the configurations that were learned, or between two.")
+        return " ".join(said) or None
