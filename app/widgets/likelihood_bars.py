@@ -36,7 +36,7 @@ class LikelihoodBars(QWidget):
 
     def show_likelihood(self, values: Mapping[str, float], chosen: str | None) -> None:
         """Show other values; the most likely first if there are too many."""
-        shown = dict(values)
+        shown = dict(sorted(values.items()))
         if (shown, chosen) == (self._values, self._chosen):
             return
         self._values, self._chosen = shown, chosen

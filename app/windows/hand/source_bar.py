@@ -126,7 +126,7 @@ class SourceBar(QFrame):
     def set_source(self, recording: str | None, camera_id: str = "") -> None:
         """What is shown: a recording by its name, or a camera."""
         if camera_id and self.cameras.findData(camera_id) < 0:
-            self.cameras.addItem("Camera by its address", camera_id)
+            self.cameras.addItem("Other camera", camera_id)
         self.cameras.setCurrentIndex(max(self.cameras.findData(camera_id), 0))
         self.folder.setToolTip("Folder of captures (Ctrl+O)" if recording is None else f"Shown: {recording}")
 

@@ -96,7 +96,9 @@ class Training(QObject):
     # --- source and mode ---------------------------------------------------------------------------------
 
     def set_source(self, opened: Opened | None) -> None:
-        """Another source: a folder of captures is its own dataset."""
+        """Another source: a folder of captures is its own dataset, and nobody else's."""
+        if self.dataset is not None and self.dataset.folder == self._source_folder:
+            self.dataset = None
         self._source_folder = None if opened is None else opened.folder
         if self._source_folder is not None:
             self.dataset = HandDataset(self._source_folder)
@@ -199,7 +201,7 @@ class Training(QObject):
             return
         count = self.labelling.propose(answer)
         if count:
-            if answer.configuration and not self.panel.name():
+            if answer.configuration and not self.panel.stored_name:
                 self.panel.set_name(answer.configuration)
         else:
             self.panel.warn(f"The model finds no further point here. {answer.reason or ''}".strip())

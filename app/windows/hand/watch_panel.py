@@ -16,7 +16,7 @@ from app.widgets.pair_table import PairTable
 from app.widgets.tables import Column, Row, RowTable
 from app.windows.hand.parts import Segments, tool
 from app.windows.hand.ticks import Tick
-from app.workflows.hand_log import TrackLog, pair_name
+from app.workflows.hand_log import TrackLog, pair_name, short_name
 from core.hand.answer import HandAnswer
 from core.hand.names import PAIRS, POINT_INDEX, POINT_NAMES, spoken
 
@@ -187,7 +187,7 @@ def point_rows(answer: HandAnswer | None) -> list[Row]:
     """Rows of the table of points."""
     rows = []
     for k, name in enumerate(POINT_NAMES):
-        cells = (spoken(name).capitalize(), "–", "–", "–")
+        cells = (short_name(name).capitalize(), "–", "–", "–")
         state = "hidden"
         if answer is not None:
             error = "–" if not np.isfinite(answer.error_m[k]) else f"{1000 * answer.error_m[k]:.1f}"
@@ -199,5 +199,5 @@ def point_rows(answer: HandAnswer | None) -> list[Row]:
             else:
                 cells = (cells[0], "–", error, "–")
         colors = {} if state != "hidden" else dict.fromkeys(range(4), palette.FAINT)
-        rows.append(Row(name, cells, colors))
+        rows.append(Row(name, cells, colors, tooltip=spoken(name).capitalize()))
     return rows
