@@ -29,7 +29,7 @@ from devices.camera import DeviceInfo
 from devices.live import LiveFrame, LiveState
 from devices.recordings.played import PlayedCamera
 from devices.simulator.hands.shots import Holder, shoot
-from tests.gui.conftest import Show
+from tests.gui.conftest import Desk, Show
 
 CONFIGURATIONS = ("open", "point")
 FRAMES_EACH = 4
@@ -401,3 +401,20 @@ def test_the_window_reads_out_its_points(hands: Hands) -> None:
         if w.text() and w.width() < w.minimumSizeHint().width() and not w.wordWrap() and w.isVisible()
     ]
     assert not unnamed, [w.text() for w in unnamed]
+
+
+def test_the_main_window_opens_it_and_takes_it_along_when_it_closes(small_desk: Desk) -> None:
+    small_desk.click("hand_joints")
+    small_desk.wait_until(lambda: small_desk.is_shown("hand_window"), "the hand window")
+    first = small_desk.main._hand
+    small_desk.click("hand_joints")
+    assert small_desk.main._hand is first, "one window, brought to the front"
+    small_desk.idle()
+    assert first is not None
+    first.close()
+    small_desk.wait_until(lambda: small_desk.main._hand is None, "it to be gone")
+    small_desk.click("hand_joints")
+    assert small_desk.main._hand is not first
+    small_desk.idle()
+    small_desk.main.close()
+    small_desk.wait_until(lambda: not small_desk.is_shown("hand_window"), "it to be closed too")
