@@ -85,11 +85,12 @@ def _confusion_lines(confusion: dict[str, Any], accuracy: float) -> list[str]:
     total = sum(map(sum, counts))
     right = sum(counts[k][k] for k in range(len(classes)))
     width = max(12, *(len(name) for name in classes))
-    columns = [max(6, len(name)) for name in classes]
+    told = [*classes, _UNKNOWN]
+    columns = [max(6, len(name)) for name in told]
     lines = [
-        f"Cross-validation of the decision tree, {confusion['folds']} folds: {right} of {total} right "
+        f"Cross-validation in {confusion['folds']} parts: {right} of {total} frames judged rightly "
         f"({100 * accuracy:.1f} %)",
-        f"  {_CORNER:{width}}  " + "  ".join(f"{n:>{w}}" for n, w in zip(classes, columns, strict=True)),
+        f"  {_CORNER:{width}}  " + "  ".join(f"{n:>{w}}" for n, w in zip(told, columns, strict=True)),
     ]
     for name, row in zip(classes, counts, strict=True):
         cells = "  ".join(f"{count:>{w}d}" for count, w in zip(row, columns, strict=True))

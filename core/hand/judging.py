@@ -100,11 +100,18 @@ def judge(
         Of the configurations that are tried; of those that are not, nothing is said.
     """
     misfits = {name: misfit(models[name], fit) for name, fit in fits.items()}
-    names = list(fits)
+    return decide(tree, misfits, {name: fit.pair_m for name, fit in fits.items()})
+
+
+def decide(
+    tree: ConfigurationTree | None, misfits: Mapping[str, float], pairs_m: Mapping[str, FloatArray]
+) -> Verdict:
+    """Decide by how badly configurations fit, and by the distances (105,) between their points."""
+    names = list(misfits)
     logs = -np.array([misfits[name] for name in names]) / MISFIT_SCALE
     share = np.exp(logs - logs.max()) if np.isfinite(logs).any() else np.ones(len(names))
     if tree is not None:
-        said = np.mean([tree.likelihood(fit.pair_m) for fit in fits.values()], axis=0)
+        said = np.mean([tree.likelihood(pairs_m[name]) for name in names], axis=0)
         by_name = dict(zip(tree.classes, said, strict=True))
         share = share * np.array([TREE_FLOOR + by_name.get(name, 0.0) for name in names])
     share = share / share.sum()

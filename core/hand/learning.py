@@ -19,8 +19,8 @@ from core.hand.model import LEAST_FRAMES, OWN_FIELDS, LabelledFrame, learn_confi
 from core.hand.names import PAIRS, POINT_NAMES
 from core.hand.stills import still_depth
 from core.hand.surface import cut_hand
-from core.hand.tree import ConfigurationTree, learn_tree
-from core.progress import Cancelled, Progress, no_progress
+from core.hand.trying import Confusion, MeasuredHand, cross_judge, grow_tree, try_frames
+from core.progress import Cancelled, Progress, ScaledProgress, no_progress
 from core.surface.body_surface import BodySurface
 
 FloatArray = NDArray[np.float64]
@@ -32,11 +32,12 @@ STEP_PX = 2
 OFF_HAND_M = 0.010
 """A point labelled farther from the measured skin does not lie on it."""
 
-FOLDS = 5
 FEW_FRAMES = 10
 """Of a configuration: with fewer, the accuracy found by cross-validation is a rough guess."""
 
 _FAULTY_SHARE = 0.5
+_MEASURED = 0.6
+"""Share of the progress that measuring takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,35 +47,16 @@ class MeasuredFrame:
     Attributes
     ----------
     frame : LabelledFrame
+    hand : MeasuredHand
+        The same with its surface.
     left_out : tuple of str
         A sentence for each point that could not be measured, such as "index_tip is labelled 40 mm off the
         hand."; and about anchors that were found with difficulty.
     """
 
     frame: LabelledFrame
+    hand: MeasuredHand
     left_out: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Confusion:
-    """What the tree says of frames it was not grown from (cross-validation).
-
-    Attributes
-    ----------
-    classes : tuple of str
-    counts : ndarray (c, c) int64
-        Frames; rows the true configuration, columns what was said.
-    folds : int
-    """
-
-    classes: tuple[str, ...]
-    counts: NDArray[np.int64]
-    folds: int
-
-    @property
-    def accuracy(self) -> float:
-        """Share of the frames whose configuration was said rightly."""
-        return float(np.trace(self.counts) / self.counts.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +73,7 @@ class Lesson:
     points_left_out : tuple of (str, str)
         Frames that teach, but less than they could: a sentence for each point that does not count.
     confusion : Confusion or None
-        None with a single configuration.
+        Of the whole judgement, by cross-validation; None with a single configuration, or too few frames.
     remarks : tuple of str
         What makes the lesson less sure than usual; sentences for people.
     """
@@ -143,7 +125,10 @@ def measure_labelled(capture: RgbdCapture, labels: FrameLabels, finder: AnchorFi
         raise WorkError("No labelled point hangs together with the anchors along the skin.")
     apart = "lies on skin that does not hang together with the anchors."
     about_anchors = [] if anchors.reason is None else [anchors.reason]
-    return MeasuredFrame(frame, (*about_anchors, *faults, *(f"{POINT_NAMES[p]} {apart}" for p in lost)))
+    hand_of = MeasuredHand.of(frame, fields)
+    return MeasuredFrame(
+        frame, hand_of, (*about_anchors, *faults, *(f"{POINT_NAMES[p]} {apart}" for p in lost))
+    )
 
 
 def _on_skin(points: FloatArray, labelled: IntArray, surface: BodySurface) -> tuple[IntArray, list[str]]:
@@ -217,19 +202,24 @@ def learn_hand(
     total = count if count is not None else (len(frames) if isinstance(frames, Sequence) else 0)
     collected = _Collected()
     for number, (name, capture, labels) in enumerate(frames):
-        progress(0.9 * min(number / total, 1.0) if total else 0.0, f"Measuring {name}")
+        progress(_MEASURED * min(number / total, 1.0) if total else 0.0, f"Measuring {name}")
         collected.add(name, capture, labels, finder)
-    progress(0.9, "Learning distances")
+    progress(_MEASURED, "Learning distances")
     by_name = collected.enough()
-    used = [frame for frames_of_one in by_name.values() for frame in frames_of_one]
+    used = [hand for hands_of_one in by_name.values() for hand in hands_of_one]
+    frames_used = [hand.frame for hand in used]
     rigid = finder.kind == "marker"
     models = {
-        name: learn_configuration(name, of_one, rigid_anchors=rigid) for name, of_one in by_name.items()
+        name: learn_configuration(name, [hand.frame for hand in of_one], rigid_anchors=rigid)
+        for name, of_one in by_name.items()
     }
-    progress(0.93, "Growing the decision tree")
-    several = len(models) > 1
-    model = HandModel(models, grow_tree(used) if several else None, finder.kind, marker_m, dictionary)
-    confusion = cross_validate(used, progress) if several else None
+    tree, confusion = None, None
+    if len(models) > 1:
+        tried = try_frames(used, rigid_anchors=rigid, progress=ScaledProgress(progress, _MEASURED, 0.98))
+        progress(0.98, "Growing the decision tree")
+        tree = grow_tree(frames_used, tried)
+        confusion = cross_judge(frames_used, tried) if tried else None
+    model = HandModel(models, tree, finder.kind, marker_m, dictionary)
     progress(1.0, "Learned")
     return Lesson(
         model,
@@ -237,7 +227,7 @@ def learn_hand(
         tuple(collected.left_out),
         tuple(collected.points_left_out),
         confusion,
-        _remarks(by_name),
+        _remarks(by_name, confusion is None),
     )
 
 
@@ -245,7 +235,7 @@ def learn_hand(
 class _Collected:
     """Frames as they are measured."""
 
-    frames: list[tuple[str, LabelledFrame]] = field(default_factory=list)
+    hands: list[tuple[str, MeasuredHand]] = field(default_factory=list)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     points_left_out: list[tuple[str, str]] = field(default_factory=list)
 
@@ -260,26 +250,26 @@ class _Collected:
         except GeodermError as error:
             self.left_out.append((name, str(error)))
             return
-        self.frames.append((name, measured.frame))
+        self.hands.append((name, measured.hand))
         self.points_left_out += [(name, fault) for fault in measured.left_out]
 
-    def enough(self) -> dict[str, list[LabelledFrame]]:
+    def enough(self) -> dict[str, list[MeasuredHand]]:
         """Frames by configuration, of those that have enough."""
-        by_name: dict[str, list[LabelledFrame]] = {}
-        for _, frame in self.frames:
-            by_name.setdefault(frame.configuration, []).append(frame)
+        by_name: dict[str, list[MeasuredHand]] = {}
+        for _, hand in self.hands:
+            by_name.setdefault(hand.frame.configuration, []).append(hand)
         few = {name: len(of_one) for name, of_one in by_name.items() if len(of_one) < LEAST_FRAMES}
         if len(few) == len(by_name):
             raise InputError(self._too_few(by_name), self._first_reason())
-        for name, frame in self.frames:
-            kind = frame.configuration
+        for name, hand in self.hands:
+            kind = hand.frame.configuration
             if kind in few:
                 said = f"Configuration '{kind}' has {few[kind]} of the {LEAST_FRAMES} frames it needs."
                 self.left_out.append((name, said))
         return {name: by_name[name] for name in sorted(by_name) if name not in few}
 
-    def _too_few(self, by_name: Mapping[str, Sequence[LabelledFrame]]) -> str:
-        if not self.frames and not self.left_out:
+    def _too_few(self, by_name: Mapping[str, Sequence[MeasuredHand]]) -> str:
+        if not self.hands and not self.left_out:
             return "There are no frames to learn from."
         if not by_name:
             return f"None of the {len(self.left_out)} frames teaches anything."
@@ -299,39 +289,7 @@ class _Collected:
         return f"{name}: {reason}{more}"
 
 
-def grow_tree(frames: Sequence[LabelledFrame]) -> ConfigurationTree:
-    """The decision tree of frames of at least two configurations: what it learns from is decided here."""
-    return learn_tree(np.array([frame.pair_m for frame in frames]), [frame.configuration for frame in frames])
-
-
-def cross_validate(frames: Sequence[LabelledFrame], progress: Progress = no_progress) -> Confusion:
-    """Grow the tree again and again without some frames, and ask it about those.
-
-    Folds take whole stretches of every configuration's frames, in their order, and never shuffle:
-    neighbouring frames of a recording are nearly the same, and one in training would answer for the other.
-
-    Parameters
-    ----------
-    frames : sequence of LabelledFrame
-        Of at least two configurations, at least two frames of each.
-    """
-    from sklearn.model_selection import StratifiedKFold
-
-    names = np.array([frame.configuration for frame in frames])
-    classes, numbers = np.unique(names, return_inverse=True)
-    folds = int(min(FOLDS, np.bincount(numbers).min()))
-    counts = np.zeros((len(classes), len(classes)), np.int64)
-    splits = StratifiedKFold(folds).split(np.zeros(len(frames)), numbers)
-    for fold, (grown_from, asked) in enumerate(splits):
-        progress(0.93 + 0.07 * fold / folds, "Cross-validating the decision tree")
-        tree = grow_tree([frames[k] for k in grown_from])
-        for k in asked:
-            said = tree.classes[int(np.argmax(tree.likelihood(frames[k].pair_m)))]
-            counts[numbers[k], list(classes).index(said)] += 1
-    return Confusion(tuple(map(str, classes)), counts, folds)
-
-
-def _remarks(by_name: Mapping[str, Sequence[LabelledFrame]]) -> tuple[str, ...]:
+def _remarks(by_name: Mapping[str, Sequence[MeasuredHand]], unjudged: bool) -> tuple[str, ...]:
     said = []
     few = [f"'{name}' ({len(of_one)})" for name, of_one in by_name.items() if len(of_one) < FEW_FRAMES]
     if few:
@@ -340,4 +298,8 @@ def _remarks(by_name: Mapping[str, Sequence[LabelledFrame]]) -> tuple[str, ...]:
         )
     if len(by_name) == 1:
         said.append("A single configuration: there is nothing to tell apart, and no decision tree.")
+    elif unjudged:
+        said.append(
+            f"Too few frames to say how often the configuration is judged rightly: label {LEAST_FRAMES + 1}."
+        )
     return tuple(said)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from core.errors import InputError
 from core.hand.flat import SIZE_SHARE, lay_flat, likely_changes
@@ -141,7 +142,8 @@ def learn_configuration(
     usable = known.any(axis=0)
     mean = np.where(usable, _nanmean(data), np.nan)
     prior, own = _beforehand(mean, fields, rigid_anchors)
-    centre, modes, rest = _factors(data[:, usable], prior[:, usable], own[usable])
+    with threadpool_limits(1):  # many small matrices: threads only wait for one another
+        centre, modes, rest = _factors(data[:, usable], prior[:, usable], own[usable])
     sigma, spread = np.full(len(mean), np.nan), np.zeros((len(modes), len(mean)))
     mean[usable], sigma[usable], spread[:, usable] = centre, rest, modes
     seen = known[:, : POINTS * fields].reshape(len(data), POINTS, fields).all(axis=2)

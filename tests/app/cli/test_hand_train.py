@@ -42,7 +42,7 @@ def test_a_model_is_written_and_the_lesson_told(dataset: Path, tmp_path: Path) -
     assert set(read_model(out).configurations) == set(CONFIGURATIONS)
     for name in CONFIGURATIONS:
         assert f"{name}" in outcome.out
-    assert "Cross-validation of the decision tree" in outcome.out
+    assert "frames judged rightly" in outcome.out
     assert "note: Few frames" in outcome.out
     with Image.open(picture) as image:
         assert min(image.size) > 100

@@ -13,15 +13,12 @@ from core.errors import InputError, WorkError
 from core.hand.labels import FrameLabels
 from core.hand.learning import (
     FEW_FRAMES,
-    Confusion,
-    cross_validate,
-    grow_tree,
     learn_hand,
     measure_frame,
     measure_labelled,
 )
 from core.hand.marker_anchors import MarkerAnchors
-from core.hand.model import LEAST_FRAMES, LabelledFrame
+from core.hand.model import LEAST_FRAMES
 from core.hand.names import PAIRS, POINT_NAMES
 from core.hand.stills import still_depth
 from core.progress import Cancelled
@@ -205,36 +202,6 @@ def test_no_frames_and_no_labels_are_said() -> None:
         learn_hand([], finder())
     with pytest.raises(InputError, match=r"None of the 1 frames .* It has no labels"):
         learn_hand([("one", new_frame()[1], FrameLabels())], finder())
-
-
-def synthetic(count: int, *, telling: bool) -> list[LabelledFrame]:
-    """Frames of two configurations whose distances tell them apart, or are noise."""
-    rng = np.random.default_rng(8)
-    frames = []
-    for k in range(count):
-        pair_m = rng.uniform(0.05, 0.15, len(PAIRS))
-        if telling:
-            pair_m[3] = 0.03 if k % 2 else 0.17
-        frames.append(LabelledFrame("AB"[k % 2], np.zeros((15, 6)), pair_m))
-    return frames
-
-
-def test_cross_validation_asks_about_frames_that_the_tree_has_not_seen() -> None:
-    """Noise is learned by heart without fault; frames not learned from are guessed."""
-    noise = synthetic(60, telling=False)
-    tree = grow_tree(noise)
-    by_heart = [tree.classes[int(np.argmax(tree.likelihood(f.pair_m)))] == f.configuration for f in noise]
-    assert np.mean(by_heart) > 0.9
-    assert cross_validate(noise).accuracy < 0.7
-    assert cross_validate(synthetic(60, telling=True)).accuracy == 1.0
-
-
-def test_the_confusion_matrix_has_the_truth_in_its_rows() -> None:
-    confusion = Confusion(("A", "B"), np.array([[3, 1], [0, 4]]), 4)
-    assert confusion.accuracy == 7 / 8
-    asked = cross_validate(synthetic(20, telling=True))
-    assert asked.classes == ("A", "B")
-    assert asked.counts.tolist() == [[10, 0], [0, 10]]
 
 
 def test_progress_rises_and_names_the_frame() -> None:
