@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 _POINTS = len(POINT_NAMES)
 _ROUNDS = 200
+_LEAST_KNOWN = 3
 _STEP = 1e-3
 
 SIZE_SHARE = 0.08
@@ -78,9 +79,26 @@ def lay_flat(anchor_m: FloatArray, pair_m: FloatArray) -> FlatHand:
     wanted[:_POINTS, _POINTS:] = anchor_m
     wanted[_POINTS:, :_POINTS] = anchor_m.T
     known = np.isfinite(wanted)
-    enough = known[:, _POINTS:].sum(axis=1) + known[:, :_POINTS].sum(axis=1) >= 3
-    known &= enough[:, None] & enough[None]
-    wanted = np.where(known, wanted, 0.0)
+    rows = _determined(known)
+    places = np.full((count, 2), np.nan)
+    if len(rows) >= _LEAST_KNOWN:
+        among = np.ix_(rows, rows)
+        places[rows] = _majorised(np.where(known[among], wanted[among], 0.0), known[among])
+    return FlatHand(places[:_POINTS], places[_POINTS:])
+
+
+def _determined(known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows whose place three distances to others of them determine: of the others, nothing can be said."""
+    rows = np.arange(len(known))
+    while True:
+        enough = known[np.ix_(rows, rows)].sum(axis=1) >= _LEAST_KNOWN
+        if enough.all():
+            return rows
+        rows = rows[enough]
+
+
+def _majorised(wanted: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+    """Places (k, 2) whose distances agree best with those that are known."""
     places = _first_places(wanted, known)
     laplacian = np.diag(known.sum(axis=1).astype(float)) - known
     inverse = np.linalg.pinv(laplacian)
@@ -88,9 +106,8 @@ def lay_flat(anchor_m: FloatArray, pair_m: FloatArray) -> FlatHand:
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         ratio = np.where(known, wanted / np.maximum(apart, 1e-6), 0.0)
         pull = np.diag(ratio.sum(axis=1)) - ratio
-        places = inverse @ (pull @ places)
-    places[~enough] = np.nan
-    return FlatHand(places[:_POINTS], places[_POINTS:])
+        places = np.asarray(inverse @ (pull @ places))
+    return places
 
 
 def _first_places(wanted: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
