@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 _LOGGER = logging.getLogger(__name__)
 
-_QUICK_KINDS = ("simulator", "simulator-board", "folder", "recording")
+_QUICK_KINDS = ("simulator", "simulator-board", "simulator-hand", "folder", "recording")
 """Kinds that are listed without asking any driver."""
 
 _FILE_KINDS = ("folder", "recording")

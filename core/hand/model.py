@@ -30,7 +30,8 @@ _END_SIGMA_M = 0.005
 _MODES = 10
 _PRIOR_FRAMES = 6.0
 _MEASURED_SIGMA_M = 0.002
-_ROUNDS = 10
+_ROUNDS = 60
+_SETTLED_M = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,9 +194,11 @@ def _factors(
     for _ in range(_ROUNDS):
         fitted = np.array([mean + coefficients(row - mean, modes, 1.0 / rest**2) @ modes for row in data])
         filled = np.where(known, data, fitted)
-        mean = filled.mean(axis=0)
+        before_m, mean = mean, filled.mean(axis=0)
         spread = (filled - mean).T @ (filled - mean)
         modes, rest = _split((spread + _PRIOR_FRAMES * before) / (count - 1 + _PRIOR_FRAMES))
+        if np.abs(mean - before_m).max() < _SETTLED_M:
+            break
     return mean, modes, rest
 
 

@@ -171,8 +171,8 @@ class HandTracker:
         motion = follow(past.last, depth_m, self._rig.depth, guess)
         if motion is None:
             return FoundAnchors(found.places_m, False, found.reason), False
-        frames = "frame" if past.lost == 1 else f"{past.lost} frames"
-        said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand since {frames}."
+        frames = "1 frame" if past.lost == 1 else f"{past.lost} frames"
+        said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand for {frames}."
         places = motion.apply(past.last.anchors_m)
         past.motion = motion
         return FoundAnchors(places, False, said), True

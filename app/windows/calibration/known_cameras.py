@@ -44,7 +44,7 @@ class KnownCamera:
 
 def calibratable(devices: Sequence[DeviceInfo]) -> list[DeviceInfo]:
     """Live cameras other than simulated patients, whose geometry is known exactly."""
-    return [d for d in devices if d.live and not d.id.startswith("simulator:")]
+    return [d for d in devices if d.live and not d.id.startswith(("simulator:", "simulator-hand:"))]
 
 
 def _listed(source: CameraSource, progress: Progress) -> list[DeviceInfo]:

@@ -22,6 +22,10 @@ SIMULATED = "Not calibrated: a simulated camera knows its geometry."
 NOT_CALIBRATED = "Not calibrated: places on the skin may be off by a centimetre. Calibrate the camera."
 
 
+_NO_PATIENTS = ("simulator-board:", "simulator-hand:")
+"""Simulated cameras that show something else."""
+
+
 class CameraDeck(QObject):
     """Holds at most one open camera, and the live service that looks through it.
 
@@ -97,7 +101,7 @@ class CameraDeck(QObject):
 
     def choices(self) -> list[DeviceInfo]:
         """Cameras that a patient can stand before now."""
-        return [info for info in self._context.cameras.list() if info.kind != "simulator-board"]
+        return [info for info in self._context.cameras.list() if not info.id.startswith(_NO_PATIENTS)]
 
     def choose_path(self, path: Path) -> None:
         """Use a capture folder or an .oni recording."""
