@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from core.capture import PinholeCamera, RigidTransform
 from core.hand.fields import HandFields, measure_fields
 from core.hand.model import LabelledFrame
-from core.hand.names import FINGER_OF, FINGERS, PAIRS
+from core.hand.names import FINGER_OF, FINGERS, KNUCKLES, PAIRS
 from core.hand.surface import HandSurface
 from core.surface.body_surface import BodySurface
 
@@ -57,7 +57,7 @@ class Glove:
         """Points (15, 2) and anchors (4, 2) in the plane of the glove."""
         places = []
         for k, length in enumerate(self.lengths_m):
-            for share in (0.88, 0.5, 0.0):
+            for share in (0.88, 0.5, -0.08):
                 if k == 0:
                     places.append((-0.5 * _PALM_M[0] - share * length, _THUMB_Y_M))
                 else:
@@ -66,8 +66,9 @@ class Glove:
 
     @cached_property
     def points_m(self) -> FloatArray:
-        """Points (15, 3), NaN for those of missing fingers."""
+        """Points (15, 3), NaN for those of missing fingers but their knuckles, which the palm shows."""
         lost = np.isin(FINGER_OF, [FINGERS.index(name) for name in self.missing])
+        lost[list(KNUCKLES)] = False
         return np.where(lost[:, None], np.nan, self._in_space(self.plane()[0]))
 
     @cached_property
@@ -114,8 +115,8 @@ class Glove:
         between = np.full((len(points), len(points)), np.nan)
         surface = self.hand.surface
         sources = surface.nearest(points[there])
-        for p, field in zip(there, self.fields.solver.distances(sources), strict=True):
-            between[p, there] = [surface.interpolate(field, source) for source in sources]
+        for p, along in zip(there, self.fields.solver.distances(sources), strict=True):
+            between[p, there] = [surface.interpolate(along, source) for source in sources]
         return LabelledFrame(configuration, anchor_m, np.array([between[i, j] for i, j in PAIRS]))
 
 

@@ -66,7 +66,7 @@ def test_three_frames_are_enough_and_fewer_are_refused() -> None:
     assert learned().frames == LEAST_FRAMES == 3
     with pytest.raises(InputError, match="'flat' has 2 labelled frames"):
         learn_configuration("flat", [frame(seed=1), frame(seed=2)])
-    with pytest.raises(InputError, match="'flat' has 1 labelled frame[.]"):
+    with pytest.raises(InputError, match=r"'flat' has 1 labelled frame\."):
         learn_configuration("flat", [frame()])
 
 
