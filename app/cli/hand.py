@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from core.errors import InputError
+from core.errors import InputError, WorkError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from core.hand.labels import FrameLabels
     from core.hand.tracker import TrackingOptions
     from core.hand.tracks import Tracks
+
+_OF_A_SEQUENCE = ("capture.json", "hand.json", "sequence.json")
 
 
 class Anchors(StrEnum):
@@ -83,6 +86,7 @@ def train(
     check_marker(marker_m, dictionary)
     _check_out("--out", out)
     _check_tree_picture(tree_picture)
+    _check_apart({"--out": out, "--tree-picture": tree_picture}, {})
     folders = dataset_frames(dataset)
     labelled = [folder for folder in folders if (folder / LABELS_FILE).exists()]
     if not labelled:
@@ -102,6 +106,8 @@ def train(
                 progress=hand_words.Ticker(),
             )
         except InputError as error:
+            if error.message.startswith(str(dataset)):  # of a file in it
+                raise
             raise InputError(f"{dataset}: {error.message}", error.advice) from error
     write_model(out, lesson.model)
     if tree_picture is not None and lesson.model.tree is not None:
@@ -146,8 +152,7 @@ def track(
 
     _check_out("--out", out)
     _check_out("--csv", csv)
-    if csv is not None and csv.resolve() == out.resolve():
-        raise InputError(f"--csv {csv}: is the file of --out, too.", "Give another name.")
+    _check_apart({"--out": out, "--csv": csv}, {"MODEL": model_file, "SEQUENCE": sequence})
     model = _overridden(read_model(model_file), marker_m, dictionary)
     if configuration is not None and configuration not in model.configurations:
         raise InputError(
@@ -196,13 +201,14 @@ def _followed(model: HandModel, sequence: Path, options: TrackingOptions) -> tup
 
 def _labelled(folders: list[Path]) -> Iterator[tuple[str, RgbdCapture, FrameLabels]]:
     """Labelled captures, read one at a time."""
+    from app.cli.hand_frames import capture_name
     from core.capture import read_capture
     from core.hand.dataset import read_labels
     from core.hand.labels import FrameLabels
 
     for folder in folders:
         labels = read_labels(folder) or FrameLabels()
-        yield folder.resolve().name, read_capture(folder), labels
+        yield capture_name(folder), read_capture(folder), labels
 
 
 @contextmanager
@@ -255,10 +261,37 @@ def _check_out(option: str, path: Path | None) -> None:
     """Refuse a file that cannot be written before the work is done for nothing."""
     if path is None:
         return
-    if not path.parent.is_dir():
-        raise InputError(f"{option} {path}: the folder does not exist.", "Create it or choose another.")
-    if path.is_dir():
-        raise InputError(f"{option} {path}: is a folder.", "Give the name of a file.")
+    try:
+        if path.is_dir():
+            raise InputError(f"{option} {path}: is a folder.", "Give the name of a file.")
+        folder = path.resolve().parent
+        if path.exists() and not path.is_file():  # a device or pipe
+            writable = os.access(path, os.W_OK)
+        elif not folder.is_dir():
+            raise InputError(f"{option} {path}: the folder does not exist.", "Create it or choose another.")
+        else:
+            writable = os.access(folder, os.W_OK | os.X_OK)
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
+        raise InputError(f"{option} {str(path)[:300]}: is no name for a file.") from error
+    if not writable:
+        raise WorkError(f"{option} {path}: cannot be written.", "Choose a folder that you may write to.")
+    if path.name in _OF_A_SEQUENCE and path.exists():
+        raise InputError(
+            f"{option} {path}: is a file of a sequence, which would be lost.", "Give another name."
+        )
+
+
+def _check_apart(outs: dict[str, Path | None], ins: dict[str, Path]) -> None:
+    """Refuse to write a file that is read, or two into one."""
+    taken = {path.resolve(): option for option, path in ins.items()}
+    for option, path in outs.items():
+        if path is None or (path.exists() and not path.is_file()):
+            continue
+        if path.resolve() in taken:
+            raise InputError(
+                f"{option} {path}: is the file of {taken[path.resolve()]}, too.", "Give another name."
+            )
+        taken[path.resolve()] = option
 
 
 def _check_tree_picture(path: Path | None) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from core.capture.folder import read_capture
 from core.capture.rgbd import CameraRig
+from core.errors import InputError
 from core.hand.dataset import dataset_frames
 from core.hand.stills import still_depth
 
@@ -45,10 +46,19 @@ def sequence_frames(path: Path) -> tuple[int, Iterator[SequenceFrame]]:
     InputError
         If there is no such sequence.
     """
-    if path.is_file():
+    try:
+        recorded = path.is_file()
+    except OSError as error:
+        raise InputError(f"{str(path)[:300]}: cannot be read ({error.strerror}).") from error
+    if recorded:
         return 0, _recorded(path)
     folders = dataset_frames(path)
     return len(folders), _captured(folders)
+
+
+def capture_name(folder: Path) -> str:
+    """The capture's name where it lies: of a link its own, of "." and the like the folder's."""
+    return folder.name if folder.name not in ("", "..") else folder.resolve().name
 
 
 def same_rig(one: CameraRig, other: CameraRig) -> bool:
@@ -63,7 +73,7 @@ def same_rig(one: CameraRig, other: CameraRig) -> bool:
 def _captured(folders: list[Path]) -> Iterator[SequenceFrame]:
     for folder in folders:
         capture = read_capture(folder)
-        yield SequenceFrame(folder.resolve().name, still_depth(capture), capture.color, capture.rig)
+        yield SequenceFrame(capture_name(folder), still_depth(capture), capture.color, capture.rig)
 
 
 def _recorded(path: Path) -> Iterator[SequenceFrame]:

@@ -6,6 +6,7 @@ points in the frame of the depth camera that capture.json describes, as its join
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +29,7 @@ FARTHEST_M = 5.0
 
 _LIMIT_BYTES = 200_000
 _MOST_FRAMES = 100_000
+_MOST_LOOKED_INTO = 100
 
 
 def dataset_frames(folder: Path) -> list[Path]:
@@ -52,12 +54,27 @@ def dataset_frames(folder: Path) -> list[Path]:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "no valid path"
         raise InputError(f"{str(folder)[:300]}: cannot be listed ({reason}).") from error
     if not found:
+        deeper = _holder_of_captures(folder)
         raise InputError(
-            f"{folder}: no sub-folder holds a {CAPTURE_FILE}.", "Give a folder of capture folders."
+            f"{folder}: no sub-folder holds a {CAPTURE_FILE}.",
+            "Give a folder of capture folders."
+            if deeper is None
+            else f"Those of '{deeper}' do: give that one, or put all capture folders into one folder.",
         )
     if len(found) > _MOST_FRAMES:
         raise InputError(f"{folder}: holds more than {_MOST_FRAMES} captures.", "Take a part of them.")
     return found
+
+
+def _holder_of_captures(folder: Path) -> str | None:
+    """The name of a sub-folder that is a folder of capture folders, if there is one; looked for briefly."""
+    try:
+        for inner in islice(sorted(p for p in folder.iterdir() if p.is_dir()), _MOST_LOOKED_INTO):
+            if any((p / CAPTURE_FILE).exists() for p in islice(inner.iterdir(), _MOST_LOOKED_INTO)):
+                return inner.name
+    except OSError:
+        return None
+    return None
 
 
 def configuration_name(text: str) -> str:

@@ -62,21 +62,37 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; see `write_document`."""
+    """Write a file whole or not at all; see `write_document`.
+
+    A link stays one, its target is written; into a device or pipe (/dev/stdout) it is written without
+    putting a file in its place.
+    """
     temporary: Path | None = None
     try:
-        with tempfile.NamedTemporaryFile("wb", dir=path.parent, prefix=".written-", delete=False) as file:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            _write_through(path, content)
+            return
+        target = path.resolve()
+        with tempfile.NamedTemporaryFile("wb", dir=target.parent, prefix=".written-", delete=False) as file:
             temporary = Path(file.name)
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
         temporary.chmod(0o644)
-        temporary.replace(path)
-    except OSError as error:
+        temporary.replace(target)
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
         raise WorkError(
-            f"{path}: cannot be written ({error.strerror or error}).",
+            f"{path}: cannot be written ({getattr(error, 'strerror', None) or error}).",
             "Choose a folder that you may write to.",
         ) from error
     finally:  # after Ctrl-C, too; nothing is there once it is in place
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def _write_through(path: Path, content: bytes) -> None:
+    """Write into what is no file; a pipe that nobody reads is an error, it is not waited for."""
+    descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    os.set_blocking(descriptor, True)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(content)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.hand.dataset import read_labels
+from core.hand.dataset import LABELS_FILE, read_labels
 from core.hand.hand_model import HandModel
 from core.hand.learning import learn_hand
 from core.hand.marker_anchors import MarkerAnchors
@@ -209,3 +209,44 @@ def test_wrong_files_of_tracking_are_told(model: Path, sequence: Path, tmp_path:
     (broken / "capture.json").write_text("{", encoding="utf-8")
     assert_told(geoderm("hand", "track", model, broken.parent, "--out", out), 2, "capture.json")
     assert not out.exists()
+
+
+def test_what_is_read_is_not_written_over(model: Path, sequence: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "model.json"
+    mine.write_bytes(model.read_bytes())
+    before = mine.read_bytes()
+    link = tmp_path / "link.json"
+    link.symlink_to(mine)
+    out = tmp_path / "t.json"
+    assert_told(geoderm("hand", "track", mine, sequence, "--out", link), 2, "--out", "MODEL")
+    assert_told(geoderm("hand", "track", mine, sequence, "--out", out, "--csv", mine), 2, "--csv", "MODEL")
+    copy = copy_of(sequence / "new", tmp_path / "s" / "new")
+    labels = (copy / LABELS_FILE).read_bytes()
+    assert_told(geoderm("hand", "track", mine, copy, "--out", copy / LABELS_FILE), 2, LABELS_FILE)
+    assert (mine.read_bytes(), (copy / LABELS_FILE).read_bytes()) == (before, labels)
+    assert not out.exists()
+
+
+def test_a_linked_capture_is_told_by_its_name_in_the_sequence(
+    model: Path, sequence: Path, tmp_path: Path
+) -> None:
+    """Several people's frames put together by links have the same names where they come from."""
+    together = tmp_path / "together"
+    together.mkdir()
+    (together / "anna_new").symlink_to(sequence / "new")
+    (frame,) = tracked(model, together, tmp_path / "t.json")
+    assert frame["capture"] == "anna_new"
+
+
+def test_a_table_into_a_device_leaves_the_device_alone(model: Path, sequence: Path, tmp_path: Path) -> None:
+    device = tmp_path / "null"
+    device.symlink_to("/dev/null")
+    outcome = geoderm("hand", "track", model, sequence / "new", "--out", tmp_path / "t.json", "--csv", device)
+    assert outcome.code == 0
+    assert device.is_char_device()
+
+
+def test_a_sequence_whose_name_cannot_be_is_told_briefly(model: Path, tmp_path: Path) -> None:
+    assert_told(
+        geoderm("hand", "track", model, "x" * 5000, "--out", tmp_path / "t.json"), 2, "cannot be read"
+    )

@@ -214,3 +214,11 @@ def test_any_bytes_give_labels_or_one_clear_refusal(content: bytes) -> None:
         (Path(folder) / LABELS_FILE).write_bytes(content)
         labels, refusal = outcome(Path(folder))
         assert labels is not None or LABELS_FILE in refusal
+
+
+def test_a_folder_of_datasets_says_where_the_captures_are(tmp_path: Path) -> None:
+    capture = tmp_path / "all" / "anna" / "frame_0001"
+    capture.mkdir(parents=True)
+    (capture / "capture.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="'anna'"):
+        dataset_frames(tmp_path / "all")
