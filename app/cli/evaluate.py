@@ -29,7 +29,7 @@ _Value = TypeVar("_Value")
 
 def register(app: typer.Typer) -> None:
     """Add the command group."""
-    from app.cli import evaluate_calibrate, evaluate_sensors, evaluate_thesis
+    from app.cli import evaluate_calibrate, evaluate_hand, evaluate_sensors, evaluate_thesis
 
     group = typer.Typer(help="Measure accuracy.", no_args_is_help=True, pretty_exceptions_enable=False)
     group.callback()(_group)
@@ -39,6 +39,7 @@ def register(app: typer.Typer) -> None:
     evaluate_calibrate.register(group)
     evaluate_sensors.register(group)
     evaluate_thesis.register(group)
+    evaluate_hand.register(group)
     app.add_typer(group, name="evaluate")
 
 

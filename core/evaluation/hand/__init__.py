@@ -1,0 +1,1 @@
+"""Experiments of the hand application: scores, tables and pictures."""
