@@ -192,7 +192,7 @@ def _followed(model: HandModel, sequence: Path, options: TrackingOptions) -> tup
                 tracker = HandTracker(model, rig, finder, options)
             answer = tracker.track(frame.depth_m, frame.rgb)
             times_s.append(time.perf_counter() - begun_s)
-            kept.append(tracked_frame(frame.name, answer))
+            kept.append(tracked_frame(frame.name, answer, frame.stored_width))
     ticker(1.0)
     if not kept:
         raise InputError(f"{sequence}: has no frames.", "Choose another recording.")

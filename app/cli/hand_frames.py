@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.cli.stored_pixels import mirrored_captures
 from core.capture.folder import read_capture
 from core.capture.rgbd import CameraRig
 from core.errors import InputError
@@ -28,12 +29,20 @@ class SequenceFrame:
         0 for no measurement.
     rgb : ndarray (h', w', 3) uint8 or None
     rig : CameraRig
+    mirrored : bool
+        The pictures are stored mirrored: a stored pixel u is here ``width - 1 - u``.
     """
 
     name: str
     depth_m: NDArray[np.float64]
     rgb: NDArray[np.uint8] | None
     rig: CameraRig
+    mirrored: bool = False
+
+    @property
+    def stored_width(self) -> int | None:
+        """Width of the picture in which pixels are mirrored as stored; None if they are not mirrored."""
+        return self.rig.picture_camera.width if self.mirrored else None
 
 
 def sequence_frames(path: Path) -> tuple[int, Iterator[SequenceFrame]]:
@@ -73,7 +82,9 @@ def same_rig(one: CameraRig, other: CameraRig) -> bool:
 def _captured(folders: list[Path]) -> Iterator[SequenceFrame]:
     for folder in folders:
         capture = read_capture(folder)
-        yield SequenceFrame(capture_name(folder), still_depth(capture), capture.color, capture.rig)
+        mirrored = bool(mirrored_captures(folder, [folder.name]))
+        depth_m = still_depth(capture)
+        yield SequenceFrame(capture_name(folder), depth_m, capture.color, capture.rig, mirrored)
 
 
 def _recorded(path: Path) -> Iterator[SequenceFrame]:

@@ -46,6 +46,7 @@ def lesson_document(lesson: Lesson, out: Path, unlabelled: int, seconds: float) 
         if confusion is None
         else {
             "classes": list(confusion.classes),
+            "said": [*confusion.classes, _UNKNOWN],
             "counts": confusion.counts.tolist(),
             "folds": confusion.folds,
         },
@@ -85,7 +86,7 @@ def _confusion_lines(confusion: dict[str, Any], accuracy: float) -> list[str]:
     total = sum(map(sum, counts))
     right = sum(counts[k][k] for k in range(len(classes)))
     width = max(12, *(len(name) for name in classes))
-    told = [*classes, _UNKNOWN]
+    told = confusion["said"]
     columns = [max(6, len(name)) for name in told]
     lines = [
         f"Cross-validation in {confusion['folds']} parts: {right} of {total} frames judged rightly "

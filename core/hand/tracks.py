@@ -75,8 +75,12 @@ class Tracks:
     frames: tuple[TrackedFrame, ...]
 
 
-def tracked_frame(name: str, answer: HandAnswer) -> TrackedFrame:
-    """What is kept of an answer: rounded to 0.01 mm and 0.01 pixels, without points that lack a number."""
+def tracked_frame(name: str, answer: HandAnswer, mirrored_px: int | None = None) -> TrackedFrame:
+    """What is kept of an answer: rounded to 0.01 mm and 0.01 pixels, without points that lack a number.
+
+    ``mirrored_px`` is the width of a picture that is stored mirrored: pixels then count in it as it is
+    stored. Points stay in the camera's real frame.
+    """
     told = (
         np.isfinite(answer.points_m).all(axis=1)
         & np.isfinite(answer.pixels).all(axis=1)
@@ -84,15 +88,18 @@ def tracked_frame(name: str, answer: HandAnswer) -> TrackedFrame:
     )
     points: dict[str, TrackedPoint | None] = {}
     for k, point in enumerate(POINT_NAMES):
-        points[point] = _point(answer, k) if told[k] else None
+        points[point] = _point(answer, k, mirrored_px) if told[k] else None
     # a folder's name may hold bytes that are no text
     name = name.encode("utf-8", "replace").decode("utf-8")
     return TrackedFrame(name, answer.configuration, bool(answer.marker_seen), answer.reason, points)
 
 
-def _point(answer: HandAnswer, k: int) -> TrackedPoint:
+def _point(answer: HandAnswer, k: int, mirrored_px: int | None) -> TrackedPoint:
     x, y, z = (round(float(value), _METRE_DIGITS) + 0.0 for value in answer.points_m[k])
-    u, v = (round(float(value), _PIXEL_DIGITS) + 0.0 for value in answer.pixels[k])
+    across, down = map(float, answer.pixels[k])
+    if mirrored_px is not None:
+        across = mirrored_px - 1 - across
+    u, v = (round(value, _PIXEL_DIGITS) + 0.0 for value in (across, down))
     confidence = round(min(max(float(answer.confidence[k]), 0.0), 1.0), _CONFIDENCE_DIGITS)
     return TrackedPoint((x, y, z), (u, v), confidence)
 

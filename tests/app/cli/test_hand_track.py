@@ -16,7 +16,7 @@ from core.hand.learning import learn_hand
 from core.hand.marker_anchors import MarkerAnchors
 from core.hand.model_file import write_model
 from core.hand.names import POINT_NAMES
-from tests.app.cli.cases import assert_told, copy_of, geoderm, without_color
+from tests.app.cli.cases import assert_told, copy_of, geoderm, mirrored, without_color
 from tests.core.hand.training_frames import CONFIGURATIONS, new_frame, training_frames, write_dataset
 
 FIELDS = ["capture", "configuration", "marker_seen", "reason", "points"]
@@ -250,3 +250,18 @@ def test_a_sequence_whose_name_cannot_be_is_told_briefly(model: Path, tmp_path: 
     assert_told(
         geoderm("hand", "track", model, "x" * 5000, "--out", tmp_path / "t.json"), 2, "cannot be read"
     )
+
+
+def test_pixels_count_in_the_pictures_as_they_are_stored(model: Path, sequence: Path, tmp_path: Path) -> None:
+    """A mirrored recording: points in the camera's real frame, pixels in the mirrored picture on disk."""
+    copy = mirrored(copy_of(sequence / "new", tmp_path / "s" / "new"))
+    (plain,) = tracked(model, sequence / "new", tmp_path / "plain.json")
+    (other,) = tracked(model, copy, tmp_path / "mirrored.json")
+    width = json.loads((copy / "capture.json").read_text(encoding="utf-8"))["color"]["intrinsics"]["width"]
+    told = [name for name, point in plain["points"].items() if point is not None]
+    assert told
+    for name in told:
+        one, two = plain["points"][name], other["points"][name]
+        assert two["point_m"] == pytest.approx(one["point_m"], abs=1e-5)
+        u, v = one["pixel"]
+        assert two["pixel"] == pytest.approx([width - 1 - u, v], abs=0.02)

@@ -55,6 +55,8 @@ def test_json_tells_the_lesson_field_by_field(dataset: Path, tmp_path: Path) -> 
     told: dict[str, Any] = json.loads(outcome.out)
     assert told["configurations"] == [{"name": name, "frames": FRAMES} for name in CONFIGURATIONS]
     assert told["confusion"]["classes"] == list(CONFIGURATIONS)
+    assert told["confusion"]["said"] == [*CONFIGURATIONS, "unknown"]
+    assert all(len(row) == len(CONFIGURATIONS) + 1 for row in told["confusion"]["counts"])
     assert sum(map(sum, told["confusion"]["counts"])) == 2 * FRAMES
     assert 0.0 <= told["accuracy"] <= 1.0
     assert (told["anchors"], told["marker_m"], told["dictionary"]) == ("marker", 0.036, "DICT_4X4_50")
