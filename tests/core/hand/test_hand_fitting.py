@@ -67,7 +67,7 @@ def test_points_of_a_glove_of_another_size_are_found_from_three_frames(
     larger, _ = learned().expected(fit.b)
     usual, _ = learned().expected(np.zeros(len(fit.b)))
     # the middle fingertip from the marker: the coefficients tell the size
-    assert (larger[6, :4] / usual[6, :4]).mean() == pytest.approx(size, abs=0.03)
+    assert (larger[6, :4] / usual[6, :4]).mean() == pytest.approx(size, abs=0.045)
 
 
 @pytest.mark.parametrize("missing", [("index",), ("ring", "little"), ("thumb",)])
@@ -199,8 +199,6 @@ def test_points_of_hands_never_trained_on_are_found_and_hidden_ones_mostly_left_
 ) -> None:
     off, told_hidden, hidden = [], 0, 0
     for (name, shape), shot in shots.items():
-        if name not in hand_model.configurations:
-            continue
         fit = measured(shot, hand_model)[name]
         there = found(fit)
         assert there[shot.visible].mean() > 0.8, (name, shape)
