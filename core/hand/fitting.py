@@ -29,11 +29,13 @@ _PAIR_CAP = 9.0
 _PAIR_SHARE = 6.0
 _PAIR_WEIGHT = 0.1
 _ABSENT_COST = 25.0
-_SELDOM = 0.05
+_SELDOM, _OFTEN = 0.05, 0.5
 _ROUNDS = 3
 _SWEEPS = 3
-_STARTS = (-1.5, 0.0, 1.5)
-_START_MODES = 1
+_SIZES = (-0.26, -0.13, 0.0, 0.13)
+"""A child's hand is a quarter smaller than what was learned from adults."""
+
+_OTHER_HAND = 0.7
 _MOVED_M = 0.002
 _TAIL = 4.0
 _REACH_M = 0.008
@@ -129,12 +131,16 @@ def fit_configuration(
     """
     search = _Search(model, vertices_m, distances_m, hint)
     if hint is not None:
-        b = hint.b
-    else:
-        modes = np.eye(len(model.modes_m))
-        starts = [start * modes[k] for k in range(_START_MODES) for start in _STARTS if start or not k]
-        b = min((search.quickly(start) for start in starts), key=search.misfit)
-    return search.jointly(b, solver)
+        return search.jointly(hint.b, solver)
+    starts = [search.quickly(search.sized(larger)) for larger in _SIZES]
+    tried = [search.jointly(b, solver) for b in _different(sorted(starts, key=search.misfit))]
+    return min(tried, key=search.disagreement)
+
+
+def _different(starts: list[FloatArray]) -> list[FloatArray]:
+    """The best start, and the best of those that mean another hand: fingers may have changed places."""
+    others = [b for b in starts[1:] if np.linalg.norm(b - starts[0]) > _OTHER_HAND]
+    return [starts[0], *others[:1]]
 
 
 class _Search:
@@ -182,6 +188,18 @@ class _Search:
         """How badly a hand of these coefficients fits at all."""
         cost = self._anchor_costs(b, _QUICK_OWN_CAP)[self._likely]
         return float(np.minimum(cost.min(axis=1), _COST_CAP).sum() + b @ b) if len(cost) else np.inf
+
+    def sized(self, larger: float) -> FloatArray:
+        """Coefficients of a hand that is larger by this share."""
+        model = self._model
+        weight = np.where(np.isfinite(model.sigma_m), model.sigma_m, np.inf) ** -2.0
+        return coefficients(larger * model.mean_m, model.modes_m, weight)
+
+    def disagreement(self, fit: HandFit) -> float:
+        """How badly a joint answer agrees with the model, with its absent points."""
+        due = self._likely & (self._model.seen > _OFTEN)
+        cost = np.where(np.isfinite(fit.cost), fit.cost, np.where(due, _ABSENT_COST, 0.0))
+        return float(cost.sum() + fit.b @ fit.b)
 
     def quickly(self, b: FloatArray) -> FloatArray:
         """Coefficients by the anchors alone, from a start."""

@@ -21,11 +21,11 @@ _ROUNDS = 200
 _LEAST_KNOWN = 3
 _STEP = 1e-3
 
-SIZE_SHARE = 0.08
+SIZE_SHARE = 0.10
 """Standard deviation of the size of hands."""
 
-_SHIFT_M = 0.003
-_TURN = np.deg2rad(5.0)
+_SHIFT_M = 0.0015
+_TURN = np.deg2rad(2.5)
 _SPREAD = np.deg2rad(4.0)
 _STRETCH = 0.03
 _PALM_SHIFT_M = 0.004
@@ -121,11 +121,11 @@ def _first_places(wanted: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
     return np.asarray(vectors[:, -2:] * np.sqrt(np.maximum(values[-2:], 1e-8)))
 
 
-def likely_changes(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
-    """How distances may differ from one hand and one day to another, each row one standard deviation.
+def changes_between_people(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
+    """How distances differ from one hand and one session to another, each row one standard deviation.
 
-    Size of the hand (8 %), fingers' spread (4 degrees) and length (3 %); a marker that sits 3 mm or 5
-    degrees elsewhere, or palm landmarks that each stray by 4 mm.
+    Size of the hand (10 %: children, men), and a marker that sits 3 mm or 5 degrees elsewhere. Any number of
+    frames of one hand says nothing about it.
 
     Parameters
     ----------
@@ -136,6 +136,7 @@ def likely_changes(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
     Returns
     -------
     ndarray (k, 15 a + 105)
+        The size first.
     """
     points, anchors = flat.points_m, flat.anchors_m
     still_points, still = np.zeros_like(points), np.zeros_like(anchors)
@@ -146,7 +147,18 @@ def likely_changes(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
         for axis in (0, 1):
             rows.append(flat.change(still_points, still + _SHIFT_M * np.eye(2)[axis]))
         rows.append(flat.change(still_points, _TURN * _quarter(anchors - centre)))
-    else:
+    return np.array(rows)
+
+
+def changes_between_frames(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
+    """How distances differ from frame to frame, each row one standard deviation.
+
+    Fingers' spread (4 degrees) and length (3 %: bent skin); palm landmarks that each stray by 4 mm.
+    """
+    points, anchors = flat.points_m, flat.anchors_m
+    still_points, still = np.zeros_like(points), np.zeros_like(anchors)
+    rows = []
+    if not rigid_anchors:
         for k in range(len(anchors)):
             for axis in (0, 1):
                 shift = still.copy()

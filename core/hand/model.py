@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from core.errors import InputError
-from core.hand.flat import SIZE_SHARE, lay_flat, likely_changes
+from core.hand.flat import SIZE_SHARE, changes_between_frames, changes_between_people, lay_flat
 from core.hand.names import POINT_NAMES
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +27,7 @@ _LEAST_SIGMA_M = 0.001
 _SIGMA_M = 0.002
 _RIM_SIGMA_M = 0.0015
 _END_SIGMA_M = 0.005
-_MODES = 10
+_MODES = 12
 _PRIOR_FRAMES = 6.0
 _MEASURED_SIGMA_M = 0.002
 _ROUNDS = 60
@@ -111,9 +111,9 @@ def learn_configuration(
 ) -> ConfigurationModel:
     """Mean, modes and remaining spread of the distances of one configuration.
 
-    A few frames say little about other people and other days: what is known beforehand (`core.hand.flat`)
-    counts like six frames more, so that many frames overrule it. Missing distances are filled in turn from
-    the model itself.
+    What is known beforehand (`core.hand.flat`) about how a hand is held counts like six frames more, so that
+    many frames overrule it. How people and sessions differ is added whole: all frames may be of one hand.
+    Missing distances are filled in turn from the model itself.
 
     Parameters
     ----------
@@ -142,28 +142,34 @@ def learn_configuration(
         )
     usable = known.any(axis=0)
     mean = np.where(usable, _nanmean(data), np.nan)
-    prior, own = _beforehand(mean, fields, rigid_anchors)
+    people, held, own = _beforehand(mean, fields, rigid_anchors)
     with threadpool_limits(1):  # many small matrices: threads only wait for one another
-        centre, modes, rest = _factors(data[:, usable], prior[:, usable], own[usable])
+        centre, modes, rest = _factors(data[:, usable], people[:, usable], held[:, usable], own[usable])
     sigma, spread = np.full(len(mean), np.nan), np.zeros((len(modes), len(mean)))
     mean[usable], sigma[usable], spread[:, usable] = centre, rest, modes
     seen = known[:, : POINTS * fields].reshape(len(data), POINTS, fields).all(axis=2)
     return ConfigurationModel(name, fields, mean, sigma, spread, seen.mean(axis=0), len(frames))
 
 
-def _beforehand(mean: FloatArray, fields: int, rigid_anchors: bool) -> tuple[FloatArray, FloatArray]:
-    """Likely modes (p, 15 f + 105) of such distances, and their own deviations (15 f + 105,)."""
+def _beforehand(
+    mean: FloatArray, fields: int, rigid_anchors: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Likely changes (p, 15 f + 105) between people and between frames, and own deviations (15 f + 105,)."""
     anchors = fields - OWN_FIELDS
     points, pairs = mean[: POINTS * fields].reshape(POINTS, fields), mean[POINTS * fields :]
     flat = lay_flat(points[:, :anchors], pairs)
-    changes = likely_changes(flat, rigid_anchors=rigid_anchors)
-    modes = np.zeros((len(changes), POINTS, fields))
-    modes[:, :, :anchors] = changes[:, : POINTS * anchors].reshape(-1, POINTS, anchors)
-    modes[0, :, anchors + 1] = SIZE_SHARE * np.nan_to_num(points[:, anchors + 1])
+
+    def with_own(changes: FloatArray, size: float = 0.0) -> FloatArray:
+        modes = np.zeros((len(changes), POINTS, fields))
+        modes[:, :, :anchors] = changes[:, : POINTS * anchors].reshape(-1, POINTS, anchors)
+        modes[0, :, anchors + 1] = size * np.nan_to_num(points[:, anchors + 1])
+        return np.hstack([modes.reshape(len(modes), -1), changes[:, POINTS * anchors :]])
+
     own = np.full((POINTS, fields), _SIGMA_M)
     own[:, anchors], own[:, anchors + 1] = _RIM_SIGMA_M, _END_SIGMA_M
     return (
-        np.hstack([modes.reshape(len(modes), -1), changes[:, POINTS * anchors :]]),
+        with_own(changes_between_people(flat, rigid_anchors=rigid_anchors), SIZE_SHARE),
+        with_own(changes_between_frames(flat, rigid_anchors=rigid_anchors)),
         np.concatenate([own.ravel(), np.full(len(pairs), _SIGMA_M)]),
     )
 
@@ -174,14 +180,16 @@ def _nanmean(values: FloatArray) -> FloatArray:
 
 
 def _factors(
-    data: FloatArray, prior: FloatArray, own: FloatArray
+    data: FloatArray, people: FloatArray, held: FloatArray, own: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean (d,), modes (k, d) and remaining deviation (d,) of data (n, d) with gaps (factor analysis).
 
     Parameters
     ----------
     data : ndarray (n, d)
-    prior : ndarray (p, d)
+    people : ndarray (p, d)
+        Modes that are added to what the data show.
+    held : ndarray (q, d)
         Modes that are likely beforehand.
     own : ndarray (d,)
         Deviation beside them.
@@ -189,14 +197,15 @@ def _factors(
     count = len(data)
     known = np.isfinite(data)
     mean = _nanmean(data)
-    before = prior.T @ prior + np.diag(own**2)
-    modes, rest = _split(before)
+    between, within = people.T @ people, held.T @ held + np.diag(own**2)
+    modes, rest = _split(between + within)
     for _ in range(_ROUNDS):
         fitted = np.array([mean + coefficients(row - mean, modes, 1.0 / rest**2) @ modes for row in data])
         filled = np.where(known, data, fitted)
         before_m, mean = mean, filled.mean(axis=0)
         spread = (filled - mean).T @ (filled - mean)
-        modes, rest = _split((spread + _PRIOR_FRAMES * before) / (count - 1 + _PRIOR_FRAMES))
+        seen = (spread + _PRIOR_FRAMES * within) / (count - 1 + _PRIOR_FRAMES)
+        modes, rest = _split(between + seen)
         if np.abs(mean - before_m).max() < _SETTLED_M:
             break
     return mean, modes, rest
