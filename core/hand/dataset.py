@@ -6,6 +6,7 @@ points in the frame of the depth camera that capture.json describes, as its join
 
 from __future__ import annotations
 
+import unicodedata
 from itertools import islice
 from pathlib import Path
 from typing import Annotated
@@ -78,14 +79,14 @@ def _holder_of_captures(folder: Path) -> str | None:
 
 
 def configuration_name(text: str) -> str:
-    """The name of a configuration as it is kept: without blanks around it.
+    """The name of a configuration as it is kept: without blanks around it, accents with their letters.
 
     Raises
     ------
     InputError
         If it is empty, too long or cannot be printed.
     """
-    name = text.strip()
+    name = unicodedata.normalize("NFC", text.strip())
     if not name:
         raise InputError("The name of a configuration is empty.", "Give one such as 'open' or 'A'.")
     if len(name) > LONGEST_NAME or not name.isprintable():

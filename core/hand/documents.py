@@ -42,7 +42,7 @@ def first_fault(error: ValidationError) -> str:
     where = ".".join(str(part) for part in first["loc"])
     said = first["msg"].removeprefix("Value error, ").rstrip(".")
     told = f"{where}: {said}" if where else said
-    return f"{told[:_LONGEST_TOLD]}."
+    return f"{told}." if len(told) <= _LONGEST_TOLD else f"{told[:_LONGEST_TOLD]} ..."
 
 
 def write_document(path: Path, content: Mapping[str, object]) -> None:

@@ -35,6 +35,9 @@ OFF_HAND_M = 0.010
 FEW_FRAMES = 10
 """Of a configuration: with fewer, the accuracy found by cross-validation is a rough guess."""
 
+FEW_POINTS = 3
+"""Of a configuration: with fewer it is hardly told from others. A fist shows few."""
+
 _FAULTY_SHARE = 0.5
 _MEASURED = 0.6
 """Share of the progress that measuring takes."""
@@ -296,6 +299,11 @@ def _remarks(by_name: Mapping[str, Sequence[MeasuredHand]], unjudged: bool) -> t
         said.append(
             f"Few frames of {', '.join(few)}: spreads and accuracy are rough. {FEW_FRAMES} are better."
         )
+    for name, of_one in by_name.items():
+        taught = int(np.isfinite([one.frame.anchor_m for one in of_one]).any(axis=(0, 2)).sum())
+        if taught < FEW_POINTS:
+            of_all = f"{taught} of the {len(POINT_NAMES)} points"
+            said.append(f"'{name}' is taught by {of_all}: no other can be found in it.")
     if len(by_name) == 1:
         said.append("A single configuration: there is nothing to tell apart, and no decision tree.")
     elif unjudged:

@@ -6,32 +6,34 @@ Arrays are lists, null where a distance was never seen; nothing in the file is e
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, FailFast, Field, model_validator
 
 from core.errors import InputError
 from core.hand.anchors import AnchorKind
-from core.hand.dataset import LONGEST_NAME
+from core.hand.dataset import LONGEST_NAME, configuration_name
 from core.hand.documents import CHECKED, read_document, write_document
 from core.hand.hand_model import HandModel
 from core.hand.marker import dictionaries
 from core.hand.model import OWN_FIELDS, POINTS, ConfigurationModel
 from core.hand.names import PAIRS, POINT_NAMES
+from core.hand.palm_anchors import PALM_NAMES
 from core.hand.tree import ConfigurationTree
 
 MODEL_FORMAT = "geoderm-hand-model/1"
 MARKER_RANGE_M = (0.005, 0.3)
 
-_LIMIT_BYTES = 50_000_000
+_LIMIT_BYTES = 12_000_000
 _MOST_ANCHORS = 21
 _MOST_CONFIGURATIONS = 50
 _MOST_MODES = 40
 _MOST_NODES = 20_001
 _MOST_FRAMES = 1_000_000
 _SUM_SLACK = 1e-3
+_ANCHORS = {"marker": 4, "palm": len(PALM_NAMES)}
 _LEAF_THRESHOLD = -2.0
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +43,20 @@ _Mean = Annotated[float, Field(ge=-1.0, le=2.0)]
 _Sigma = Annotated[float, Field(gt=0.0, le=1.0)]
 _Deviation = Annotated[float, Field(ge=-2.0, le=2.0)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
-_Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
+
+
+def _kept_name(value: str) -> str:
+    """As of a frame's labels: names are printed, and no file may send codes to a terminal."""
+    try:
+        kept = configuration_name(value)
+    except InputError as error:
+        raise ValueError(error.message) from error
+    if kept != value:
+        raise ValueError("has blanks around it, or accents written apart from their letters")
+    return value
+
+
+_Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_kept_name)]
 _Frames = Annotated[int, Field(ge=0, le=_MOST_FRAMES)]
 
 
@@ -138,15 +153,20 @@ def _array(values: list[float | None]) -> FloatArray:
     return np.array([np.nan if x is None else x for x in values], dtype=float)
 
 
+_Item = TypeVar("_Item")
+_List = Annotated[list[_Item], FailFast()]
+"""One fault is told: a file of millions of faults is not read to its end."""
+
+
 class _Configuration(BaseModel):
     model_config = CHECKED
     name: _Name
     frames: _Frames
     fields: int = Field(gt=OWN_FIELDS, le=_MOST_ANCHORS + OWN_FIELDS)
-    seen: list[_Share] = Field(min_length=POINTS, max_length=POINTS)
-    mean_m: list[_Mean | None]
-    sigma_m: list[_Sigma | None]
-    modes_m: list[list[_Deviation]] = Field(min_length=1, max_length=_MOST_MODES)
+    seen: _List[_Share] = Field(min_length=POINTS, max_length=POINTS)
+    mean_m: _List[_Mean | None]
+    sigma_m: _List[_Sigma | None]
+    modes_m: _List[_List[_Deviation]] = Field(min_length=1, max_length=_MOST_MODES)
 
     @model_validator(mode="after")
     def _sizes(self) -> _Configuration:
@@ -176,16 +196,16 @@ class _Configuration(BaseModel):
 
 class _Tree(BaseModel):
     model_config = CHECKED
-    classes: list[_Name] = Field(min_length=2, max_length=_MOST_CONFIGURATIONS)
-    left: list[int] = Field(min_length=1, max_length=_MOST_NODES)
-    right: list[int] = Field(max_length=_MOST_NODES)
-    feature: list[Annotated[int, Field(ge=-1, lt=len(PAIRS))]] = Field(max_length=_MOST_NODES)
-    threshold_m: list[_Distance | None] = Field(max_length=_MOST_NODES)
-    missing_left: list[bool] = Field(max_length=_MOST_NODES)
-    share: list[Annotated[list[_Share], Field(max_length=_MOST_CONFIGURATIONS)]] = Field(
+    classes: _List[_Name] = Field(min_length=2, max_length=_MOST_CONFIGURATIONS)
+    left: _List[int] = Field(min_length=1, max_length=_MOST_NODES)
+    right: _List[int] = Field(max_length=_MOST_NODES)
+    feature: _List[Annotated[int, Field(ge=-1, lt=len(PAIRS))]] = Field(max_length=_MOST_NODES)
+    threshold_m: _List[_Distance | None] = Field(max_length=_MOST_NODES)
+    missing_left: _List[bool] = Field(max_length=_MOST_NODES)
+    share: _List[Annotated[_List[_Share], Field(max_length=_MOST_CONFIGURATIONS)]] = Field(
         max_length=_MOST_NODES
     )
-    frames: list[_Frames] = Field(max_length=_MOST_NODES)
+    frames: _List[_Frames] = Field(max_length=_MOST_NODES)
 
     @model_validator(mode="after")
     def _is_a_tree(self) -> _Tree:
@@ -243,8 +263,8 @@ class _Model(BaseModel):
     anchors: AnchorKind
     marker_m: float
     dictionary: str = Field(max_length=60)
-    points: list[str] = Field(max_length=POINTS)
-    configurations: list[_Configuration] = Field(min_length=1, max_length=_MOST_CONFIGURATIONS)
+    points: _List[str] = Field(max_length=POINTS)
+    configurations: _List[_Configuration] = Field(min_length=1, max_length=_MOST_CONFIGURATIONS)
     tree: _Tree | None = None
 
     @model_validator(mode="after")
@@ -259,7 +279,7 @@ class _Model(BaseModel):
         if len(set(names)) != len(names):
             raise ValueError("configurations: a name occurs twice")
         counts = {one.fields - OWN_FIELDS for one in self.configurations}
-        if len(counts) > 1 or (self.anchors == "marker" and counts != {4}):
+        if counts != {_ANCHORS[self.anchors]}:
             raise ValueError("configurations: the numbers of anchors contradict one another")
         if (self.tree is None) != (len(names) == 1):
             raise ValueError("tree: is there exactly if there are several configurations")

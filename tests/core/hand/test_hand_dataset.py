@@ -66,6 +66,14 @@ def test_labels_are_read_back_as_they_were_written(tmp_path: Path) -> None:
         np.testing.assert_allclose(read.points_m[name], place, atol=1e-6)
 
 
+def test_a_name_is_the_same_however_its_accents_were_typed(tmp_path: Path) -> None:
+    for typed in ("g\u00e9n\u00e9reux", " ge\u0301ne\u0301reux"):
+        (tmp_path / LABELS_FILE).write_text(json.dumps({"configuration": typed}), encoding="utf-8")
+        read = read_labels(tmp_path)
+        assert read is not None
+        assert read.configuration == "g\u00e9n\u00e9reux"
+
+
 def test_the_file_is_the_documented_one(tmp_path: Path) -> None:
     write_labels(tmp_path, FrameLabels("A", {"thumb_tip": np.array([0.1, -0.2, 0.7])}))
     assert json.loads((tmp_path / LABELS_FILE).read_text(encoding="utf-8")) == {

@@ -192,6 +192,17 @@ def test_a_single_configuration_is_learned_without_a_tree() -> None:
     assert any("single configuration" in remark for remark in lesson.remarks)
 
 
+def test_a_configuration_taught_by_a_single_point_is_told() -> None:
+    frames = [
+        (name, capture, replace(labels, points_m={"middle_mcp": labels.points_m["middle_mcp"]}))
+        for name, capture, labels in training_frames()
+        if labels.configuration == "open"
+    ]
+    assert any(
+        "'open' is taught by 1 of the 15 points" in said for said in learn_hand(frames, finder()).remarks
+    )
+
+
 def test_one_training_frame_is_too_few() -> None:
     with pytest.raises(InputError, match=r"of 'open' there is 1 .* One frame shows no spread"):
         learn_hand([new_frame()], finder())
