@@ -19,6 +19,7 @@ from core.errors import InputError
 if TYPE_CHECKING:
     from core.evaluation.hand.experiments import FinderMaker
     from core.evaluation.hand.frames import HandSets
+    from core.evaluation.hand.measured_files import MeasuredFiles
     from core.evaluation.hand.run import Makers, Outcome
     from core.hand.landmarks import HandDetector
     from core.progress import Progress
@@ -66,7 +67,7 @@ def hand(
             raise InputError(f"{out}: cannot be made ({error.strerror or error}).") from error
     names = tuple(word.strip() for word in only.split(",") if word.strip())
     with hand_run(cache, quick=quick, tuning=split == "tuning", progress=tell) as run:
-        run.measure(names, real)
+        run.measure(names, real, out)
         if out is None:
             typer.echo(run.report())
             return
@@ -84,6 +85,8 @@ class HandRun:
     about : dict
         What it is measured on.
     makers : Makers
+    kept : MeasuredFiles
+        Measured training frames.
     progress : Progress
     document : dict
         ``geoderm-hand-experiments/1``, once it is measured.
@@ -92,25 +95,32 @@ class HandRun:
     sets: HandSets
     about: dict[str, Any]
     makers: Makers
+    kept: MeasuredFiles
     progress: Progress
     document: dict[str, Any] = field(default_factory=dict)
     outcome: Outcome | None = None
 
-    def measure(self, names: Sequence[str] = (), real: Path | None = None) -> None:
-        """Run some experiments, all if none is named."""
+    def measure(self, names: Sequence[str] = (), real: Path | None = None, out: Path | None = None) -> None:
+        """Run some experiments, all if none is named; figures are written after each."""
         from core.evaluation.hand.real import real_surfaces
         from core.evaluation.hand.run import EXPERIMENTS, HandExperiments
 
         started = time.perf_counter()
         surfaces = None if real is None else real_surfaces(real)
-        self.outcome = HandExperiments(self.sets, self.makers, self.progress).run(names or EXPERIMENTS)
-        minutes = round((time.perf_counter() - started) / 60, 1)
-        self.document = {
-            "format": "geoderm-hand-experiments/1",
-            "about": {**self.about, "minutes": minutes},
-            **self.outcome.figures,
-            **({} if surfaces is None else {"real": surfaces}),
-        }
+
+        def after(outcome: Outcome) -> None:
+            minutes = round((time.perf_counter() - started) / 60, 1)
+            self.document = {
+                "format": "geoderm-hand-experiments/1",
+                "about": {**self.about, "minutes": minutes},
+                **outcome.figures,
+                **({} if surfaces is None else {"real": surfaces}),
+            }
+            if out is not None:
+                self.write(out, pictures=False)
+
+        experiments = HandExperiments(self.sets, self.makers, self.progress, self.kept)
+        self.outcome = experiments.run(names or EXPERIMENTS, after)
 
     def report(self) -> str:
         """The tables."""
@@ -149,11 +159,12 @@ def hand_run(
 ) -> Iterator[HandRun]:
     """A run on the frames of a folder, or on frames that are kept for this run alone."""
     from app.cli.hand_experiment_sets import FULL, QUICK, about_sets, hand_sets
+    from core.evaluation.hand.measured_files import MeasuredFiles
 
     plan = QUICK if quick else FULL
     with kept_frames(cache) as folder, makers() as made:
         sets = hand_sets(folder, plan, tuning=tuning)
-        yield HandRun(sets, about_sets(sets, tuning=tuning), made, progress)
+        yield HandRun(sets, about_sets(sets, tuning=tuning), made, MeasuredFiles(folder), progress)
 
 
 @contextmanager

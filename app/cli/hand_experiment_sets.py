@@ -33,6 +33,7 @@ TESTING = HandVariation(
 _TRAINING_SEED, _TEST_SEED, _MOTION_SEED = 100_000, 500_000, 7
 _HOLDER_TRAINING, _HOLDER_TEST = 100, 500
 _SLOW_HZ = 15.0
+_LARGE = (0, 3, 12, 9)  # of the test: tall thin man, obese man, girl of six, average woman
 
 LEARN_FROM = 8
 """Of the tuning shapes: while something is tuned, the others are what it is judged on."""
@@ -57,11 +58,11 @@ class Plan:
     """
 
     three_each: int = 25
-    more_each: int = 8
+    more_each: int = 5
     bare_each: int = 3
     test_each: int = 4
     bare_test_each: int = 2
-    large: int = 5
+    large: int = 4
     bare_large: int = 1
     changing: int = 2
     occluded: int = 2
@@ -123,15 +124,15 @@ def hand_sets(cache: Path | None, plan: Plan = FULL, *, tuning: bool = False) ->
         kind: str,
         how_many: int,
         frames: int,
-        first: int,
+        places: tuple[int, ...],
         rate_hz: float = RATE_HZ,
         configurations: tuple[str, ...] = (),
     ) -> tuple[Motion, ...]:
-        chosen = [holders[(first + 3 * k) % len(holders)] for k in range(min(how_many, len(holders)))]
+        chosen = list(dict.fromkeys(holders[place % len(holders)] for place in places[:how_many]))
         length = max(round(frames * plan.share), 12)
         return tuple(Motion(kind, h, length, _MOTION_SEED, configurations, rate_hz, cache) for h in chosen)
 
-    large = motions("large-displacements", plan.large, USUAL_FRAMES["large-displacements"], 0)
+    large = motions("large-displacements", plan.large, USUAL_FRAMES["large-displacements"], _LARGE)
     bare_large = [replace(m, holder=replace(m.holder, marker_m=0.0)) for m in large[: plan.bare_large]]
     return HandSets(
         training=tuple(training),
@@ -140,10 +141,10 @@ def hand_sets(cache: Path | None, plan: Plan = FULL, *, tuning: bool = False) ->
         bare_test=tuple(bare_test),
         large=large,
         bare_large=tuple(bare_large),
-        changing=motions("configurations", plan.changing, 120, 1, _SLOW_HZ, FIVE),
-        occluded=motions("occlusion", plan.occluded, 124, 1, _SLOW_HZ),
-        bottle=motions("bottle", plan.bottle, 120, 2, _SLOW_HZ),
-        lost=motions("marker-lost", plan.lost, USUAL_FRAMES["marker-lost"], 0),
+        changing=motions("configurations", plan.changing, 120, (1, 4), _SLOW_HZ, FIVE),
+        occluded=motions("occlusion", plan.occluded, 124, (1, 4), _SLOW_HZ),
+        bottle=motions("bottle", plan.bottle, 120, (2, 5), _SLOW_HZ),
+        lost=motions("marker-lost", plan.lost, USUAL_FRAMES["marker-lost"], (0, 3)),
         three=THREE,
         five=FIVE,
         six=SIX,

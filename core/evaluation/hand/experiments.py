@@ -71,15 +71,8 @@ def classify(
         So many test frames, the hands and configurations in turn; all if not given.
     """
     model = taught.model()
-    scores: list[FrameScore] = []
-    chosen = list(islice(stills_in_turn(test, configurations), test_frames))
-    wanted: dict[str, set[str]] = {}
-    for whose, name in chosen:
-        wanted.setdefault(whose, set()).add(name)
-    for number, frames in enumerate(test):
-        progress(number / len(test), f"{title}: {frames.body}")
-        names = wanted.get(frames.body, set())
-        scores += track_set((f for f in frames if f.name in names), model, finder(), stills=True)
+    progress(0.0, title)
+    scores = _stills(model, configurations, test, finder, test_frames, progress)
     return Classified(title, len(taught.hands), judged(scores, configurations), scores, model)
 
 
@@ -97,15 +90,33 @@ def unlearned(
     model: HandModel,
     test: Sequence[FrameSet],
     finder: FinderMaker,
+    *,
+    most: int | None = None,
     progress: Progress = no_progress,
 ) -> LeftOut:
     """Show a configuration that the model does not have."""
+    progress(0.0, f"Without {name}")
+    return left_out(name, _stills(model, (name,), test, finder, most, progress))
+
+
+def _stills(
+    model: HandModel,
+    configurations: Sequence[str],
+    test: Sequence[FrameSet],
+    finder: FinderMaker,
+    most: int | None,
+    progress: Progress,
+) -> list[FrameScore]:
+    """Scores of single frames, at most so many: the hands and configurations in turn."""
+    wanted: dict[str, set[str]] = {}
+    for whose, name in islice(stills_in_turn(test, configurations), most):
+        wanted.setdefault(whose, set()).add(name)
     scores: list[FrameScore] = []
     for number, frames in enumerate(test):
-        progress(number / len(test), f"Without {name}: {frames.body}")
-        shown = (f for f in frames if f.labels.configuration == name)
-        scores += track_set(shown, model, finder(), stills=True)
-    return left_out(name, scores)
+        progress(number / len(test), f"Single frames of {frames.body}")
+        names = wanted.get(frames.body, set())
+        scores += track_set((f for f in frames if f.name in names), model, finder(), stills=True)
+    return scores
 
 
 def follow(

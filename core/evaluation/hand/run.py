@@ -21,6 +21,7 @@ from core.evaluation.hand.experiments import (
     unlearned,
 )
 from core.evaluation.hand.frames import HandSets
+from core.evaluation.hand.measured_files import MeasuredFiles
 from core.evaluation.hand.rivals import WAYS, LandmarkScore, beside, landmark_scores
 from core.evaluation.hand.running import Measured, Taught, measure_sets, track_set
 from core.evaluation.hand.scores import FrameScore
@@ -30,8 +31,18 @@ from core.hand.hand_model import HandModel
 from core.hand.landmarks import HandDetector
 from core.progress import Progress, no_progress
 
-BALANCED: Final = 96
-"""Training frames of every configuration where there are five or six: as many as the scarcest has."""
+BALANCED: Final = 60
+"""Training frames of every configuration where there are five or six: five of each hand."""
+
+SIX_TEST_FRAMES: Final = 168
+FEW_TEST_FRAMES: Final = 140
+"""Test frames for six configurations, and for what was learned from a few frames."""
+
+UNLEARNED_TEST_FRAMES: Final = 28
+"""Test frames of a configuration that was not learned."""
+
+OWN_HANDS: Final = 3
+"""Hands that are followed by a model of their own."""
 
 THESIS_TRAINING: Final = 300
 """Training frames of every configuration of the thesis's classifier."""
@@ -85,16 +96,30 @@ class HandExperiments:
     sets : HandSets
     makers : Makers
     progress : Progress
+    kept : MeasuredFiles, optional
+        Where measured training frames are kept for the next run.
     """
 
-    def __init__(self, sets: HandSets, makers: Makers, progress: Progress = no_progress) -> None:
-        self._sets, self._makers, self._progress = sets, makers, progress
+    def __init__(
+        self,
+        sets: HandSets,
+        makers: Makers,
+        progress: Progress = no_progress,
+        kept: MeasuredFiles | None = None,
+    ) -> None:
+        self._sets, self._makers, self._progress, self._kept = sets, makers, progress, kept
         self._measured: Measured | None = None
         self._six: Taught | None = None
         self.outcome = Outcome()
 
-    def run(self, names: Sequence[str]) -> Outcome:
+    def run(self, names: Sequence[str], after: Callable[[Outcome], None] = lambda outcome: None) -> Outcome:
         """Run some experiments of `EXPERIMENTS`.
+
+        Parameters
+        ----------
+        names : sequence of str
+        after : function of an Outcome
+            Called after each, with all there is so far.
 
         Raises
         ------
@@ -116,11 +141,14 @@ class HandExperiments:
                 )
         for name in names:
             known[name]()
+            after(self.outcome)
         return self.outcome
 
     def _learned(self) -> Measured:
         if self._measured is None:
-            self._measured = measure_sets(self._sets.training, self._makers.marker(), self._progress)
+            self._measured = measure_sets(
+                self._sets.training, self._makers.marker(), self._kept, self._progress
+            )
             self.outcome.figures["training"] = _about_training(self._measured)
         return self._measured
 
@@ -147,8 +175,8 @@ class HandExperiments:
         asked: dict[str, tuple[str, Taught, tuple[str, ...], int | None]] = {
             "three": ("3 configurations", three, sets.three, THESIS_TEST_FRAMES),
             "five": ("5 configurations", five, sets.five, None),
-            "six": ("6 configurations", self._taught(), sets.six, None),
-            "few": (said, few, sets.five, None),
+            "six": ("6 configurations", self._taught(), sets.six, SIX_TEST_FRAMES),
+            "few": (said, few, sets.five, FEW_TEST_FRAMES),
         }
         out: dict[str, Any] = {}
         for key, (title, taught, configurations, most) in asked.items():
@@ -168,7 +196,16 @@ class HandExperiments:
         self.outcome.models["marker"] = self.outcome.classified["five"].model
         self.outcome.models["six"] = self.outcome.classified["six"].model
         out["unlearned"] = [
-            asdict(unlearned(name, self._without(name), sets.test, finder, self._progress))
+            asdict(
+                unlearned(
+                    name,
+                    self._without(name),
+                    sets.test,
+                    finder,
+                    most=UNLEARNED_TEST_FRAMES,
+                    progress=self._progress,
+                )
+            )
             for name in sets.six
         ]
         changing = follow(sets.changing, self._model(), finder, progress=self._progress)
@@ -191,7 +228,7 @@ class HandExperiments:
         sequential = follow(
             sets.large, self._model(), finder, refinement="sequential", progress=self._progress
         )
-        own = own_hand(sets.large, sets.test, sets.five, finder, progress=self._progress)
+        own = own_hand(sets.large[:OWN_HANDS], sets.test, sets.five, finder, progress=self._progress)
         for key, scores in (("joint", joint), ("sequential", sequential), ("own", own)):
             self.outcome.scores[f"large {key}"] = scores
             out[key] = {
@@ -251,7 +288,7 @@ class HandExperiments:
         sets, makers = self._sets, self._makers
         if makers.palm is None or makers.landmarks is None:
             raise InputError("The palm experiment needs a landmark detector.")
-        measured = measure_sets(sets.bare_training, makers.palm(True)(), self._progress)
+        measured = measure_sets(sets.bare_training, makers.palm(True)(), self._kept, self._progress)
         palm = Taught.of(measured.chosen(sets.five), "palm", self._progress).model()
         self.outcome.models["palm"] = palm
         bare = _stills(sets, palm, makers.palm(True))

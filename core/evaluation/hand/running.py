@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from core.errors import GeodermError
 from core.evaluation.hand.frames import FrameSet, TrueFrame
+from core.evaluation.hand.measured_files import MeasuredFiles
 from core.evaluation.hand.scores import FrameScore, score_frame
 from core.hand.anchors import AnchorFinder, AnchorKind
 from core.hand.hand_model import DEFAULT_MARKER_M, HandModel
@@ -113,22 +114,35 @@ class Taught:
 
 
 def measure_sets(
-    sets: Iterable[FrameSet], finder: AnchorFinder, progress: Progress = no_progress
+    sets: Iterable[FrameSet],
+    finder: AnchorFinder,
+    kept: MeasuredFiles | None = None,
+    progress: Progress = no_progress,
 ) -> Measured:
     """Measure the labelled frames of several hands."""
     measured = Measured()
     sets = list(sets)
     for number, frames in enumerate(sets):
         progress(number / len(sets), f"Learning from {frames.body}")
-        for frame in frames:
-            try:
-                learned = measure_labelled(frame.capture, frame.labels, finder)
-            except GeodermError as error:
-                measured.left_out.append((frame.name, str(error)))
-                continue
-            measured.hands.append(learned.hand)
-            measured.bodies.append(frame.body)
+        known = None if kept is None else kept.read(frames, finder.kind)
+        hands, left_out = known or _measured(frames, finder)
+        if known is None and kept is not None:
+            kept.write(frames, finder.kind, hands, left_out)
+        measured.hands += hands
+        measured.bodies += [frames.body] * len(hands)
+        measured.left_out += left_out
     return measured
+
+
+def _measured(frames: FrameSet, finder: AnchorFinder) -> tuple[list[MeasuredHand], list[tuple[str, str]]]:
+    hands: list[MeasuredHand] = []
+    left_out: list[tuple[str, str]] = []
+    for frame in frames:
+        try:
+            hands.append(measure_labelled(frame.capture, frame.labels, finder).hand)
+        except GeodermError as error:
+            left_out.append((frame.name, str(error)))
+    return hands, left_out
 
 
 def track_set(
