@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import json
 from functools import lru_cache
@@ -20,7 +21,7 @@ from core.hand.trying import MeasuredHand
 
 _SURFACE: Final = ("surface", "surface_kernels", "segmentation", "segmentation_kernels", "skin_patch")
 _ANCHORS: Final = ("marker", "marker_anchors", "marker_edges", "marker_kernels", "palm_anchors")
-_OTHERS: Final = ("landmark_lifting", "fields", "fit_kernels", "learning", "stills")
+_OTHERS: Final = ("landmark_lifting", "fields", "learning", "stills")
 
 
 class MeasuredFiles:
@@ -75,8 +76,12 @@ def _hand(kept: Any, k: int, name: str) -> MeasuredHand:
 
 @lru_cache(maxsize=1)
 def measuring_code() -> str:
-    """Fingerprint of what measures a frame."""
+    """Fingerprint of what measures a frame (of the kernels, the one that it uses: `fields.end_distance`)."""
     import core.hand
 
+    from core.hand.fit_kernels import farthest_beyond
+
     root = Path(core.hand.__file__).parent
-    return code_fingerprint([root / f"{name}.py" for name in (*_SURFACE, *_ANCHORS, *_OTHERS)])
+    files = code_fingerprint([root / f"{name}.py" for name in (*_SURFACE, *_ANCHORS, *_OTHERS)])
+    kernel = inspect.getsource(farthest_beyond.py_func)
+    return f"{files}-{sha256(kernel.encode()).hexdigest()[:6]}"
