@@ -78,7 +78,6 @@ def _hand(kept: Any, k: int, name: str) -> MeasuredHand:
 def measuring_code() -> str:
     """Fingerprint of what measures a frame (of the kernels, the one that it uses: `fields.end_distance`)."""
     import core.hand
-
     from core.hand.fit_kernels import farthest_beyond
 
     root = Path(core.hand.__file__).parent
