@@ -102,9 +102,9 @@ def shots() -> dict[tuple[str, str], Shot]:
 
 @pytest.fixture(scope="session")
 def strolling() -> list[Shot]:
-    """Sixteen frames of an open hand that goes 8 mm and turns 3 degrees from one to the next."""
+    """Fourteen frames of an open hand that goes 8 mm and turns 3 degrees from one to the next."""
     view, rig = _view("m_41_avg", 42)
-    steps = [_gone(view, (0.008 * k, -0.002 * k, 0.003 * k), 3.0 * k) for k in range(16)]
+    steps = [_gone(view, (0.008 * k, -0.002 * k, 0.003 * k), 3.0 * k) for k in range(14)]
     return [Shot.of(take_frame(step, rig, np.random.default_rng((9, k)))) for k, step in enumerate(steps)]
 
 

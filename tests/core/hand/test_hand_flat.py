@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from core.hand.flat import SIZE_SHARE, FlatHand, lay_flat, likely_changes
+from core.hand.flat import (
+    SIZE_SHARE,
+    FlatHand,
+    changes_between_frames,
+    changes_between_people,
+    lay_flat,
+)
 from core.hand.names import FINGER_OF, PAIRS
 from tests.core.hand.made_up_hands import Glove
 
@@ -99,7 +105,7 @@ def test_a_change_is_the_difference_that_a_small_motion_makes(seed: int) -> None
 
 def test_a_larger_hand_with_the_same_marker() -> None:
     flat = glove()
-    size = likely_changes(flat, rigid_anchors=True)[0]
+    size = changes_between_people(flat, rigid_anchors=True)[0]
     anchor, pair = parts(size)
     np.testing.assert_allclose(pair, SIZE_SHARE * parts(flat.distances())[1], rtol=1e-3)
     assert (anchor[[0, 3, 6, 9, 12]] > 0.004).all()
@@ -109,23 +115,24 @@ def test_a_larger_hand_with_the_same_marker() -> None:
 
 def test_a_larger_hand_has_its_palm_farther_apart_too() -> None:
     flat = glove()
-    size = likely_changes(flat, rigid_anchors=False)[0]
+    size = changes_between_people(flat, rigid_anchors=False)[0]
     np.testing.assert_allclose(size, SIZE_SHARE * flat.distances(), rtol=1e-3, atol=1e-6)
 
 
 def test_a_marker_that_sits_elsewhere_changes_no_distance_between_points() -> None:
-    rows = likely_changes(glove(), rigid_anchors=True)[1:4]
+    rows = changes_between_people(glove(), rigid_anchors=True)[1:]
+    assert len(rows) == 3
     for row in rows:
         anchor, pair = parts(row)
         assert not pair.any()
-        assert np.abs(anchor).max() == pytest.approx(0.003, abs=0.002)
+        assert 0.0005 < np.abs(anchor).max() < 0.006
     along = parts(rows[1])[0]
-    # the middle fingertip lies straight up from the marker: 3 mm farther, or nearer, from every corner
-    np.testing.assert_allclose(np.abs(along[6]), 0.003, atol=0.0002)
+    # the middle fingertip lies straight up from the marker: as much farther, or nearer, from every corner
+    np.testing.assert_allclose(along[6], along[6].mean(), rtol=0.06)
 
 
 def test_anchors_of_a_palm_stray_one_by_one() -> None:
-    rows = likely_changes(glove(), rigid_anchors=False)[1:9]
+    rows = changes_between_frames(glove(), rigid_anchors=False)[:8]
     for k, row in enumerate(rows):
         anchor, pair = parts(row)
         assert not pair.any()
@@ -133,9 +140,9 @@ def test_anchors_of_a_palm_stray_one_by_one() -> None:
         assert not np.delete(anchor, k // 2, axis=1).any()
 
 
-@pytest.mark.parametrize(("rigid", "before"), [(True, 4), (False, 9)])
+@pytest.mark.parametrize(("rigid", "before"), [(True, 0), (False, 8)])
 def test_a_finger_that_is_spread_or_longer_concerns_no_other_two(rigid: bool, before: int) -> None:
-    rows = likely_changes(glove(), rigid_anchors=rigid)
+    rows = changes_between_frames(glove(), rigid_anchors=rigid)
     assert len(rows) == before + 10
     finger = np.array(FINGER_OF)
     for number in range(5):

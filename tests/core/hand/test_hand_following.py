@@ -150,3 +150,9 @@ def test_a_hand_that_has_left_the_picture_is_not_followed() -> None:
     assert follow(last_seen(), depth_of_balls(away @ BEFORE), CAMERA, away) is None
     behind = moved_by((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
     assert follow(last_seen(), depth_of_balls(BEFORE), CAMERA, behind) is None
+
+
+def test_a_finger_that_is_left_of_a_hand_is_no_hand() -> None:
+    rest = np.setdiff1d(np.arange(len(BALLS_M)), FINGER)
+    depth = depth_of_balls(BEFORE, without=[int(k) for k in rest])
+    assert follow(last_seen(), depth, CAMERA, RigidTransform()) is None

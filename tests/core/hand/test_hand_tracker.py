@@ -261,7 +261,7 @@ def test_a_lost_marker_is_followed_for_ten_frames_and_no_longer(
         assert np.median(off_mm(answer, shot)) < 7.0, number
         # less sure than with the marker in view
         assert answer.confidence.max() <= 0.8 < seen[1].confidence.max()
-    assert number == 14 > LOST_FRAMES + 1
+    assert number == 12 > LOST_FRAMES + 1
 
 
 def test_a_marker_that_comes_back_is_found_again(hand_model: HandModel, strolling: list[Shot]) -> None:
