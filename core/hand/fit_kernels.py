@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 @njit(cache=True, nogil=True)
 def anchor_costs(
-    distances: NDArray[np.float64],
+    values: NDArray[np.float64],
     expected: NDArray[np.float64],
     weight: NDArray[np.float64],
     active: NDArray[np.bool_],
@@ -19,15 +19,17 @@ def anchor_costs(
     near_cap: float,
     capped: int,
     cap: float,
+    most: float,
     out: NDArray[np.float64],
 ) -> None:
     """Squared, weighted difference (p, n) between every vertex's distances and those expected of a point.
 
     Parameters
     ----------
-    distances : ndarray (a, n)
+    values : ndarray (n, f)
+        Distances of every vertex, row by row, as they lie in memory.
     expected, weight : ndarray (p, a)
-        Weight 0 for a distance that does not count.
+        Weight 0 for a distance that does not count; ``values`` must be finite there.
     active : ndarray (p,) bool
         Other rows of ``out`` become inf.
     vertices : ndarray (n, 3)
@@ -37,9 +39,12 @@ def anchor_costs(
     capped : int
         The last so many fields cost ``cap`` each at most.
     cap : float
+    most : float
+        A vertex whose distances to the anchors alone cost more gets inf.
     out : ndarray (p, n)
     """
-    anchors, count = distances.shape
+    count, fields = values.shape
+    hard = fields - capped
     for p in range(len(expected)):
         if not active[p]:
             out[p] = np.inf
@@ -47,11 +52,15 @@ def anchor_costs(
         drawn = not np.isnan(near[p, 0])
         for v in range(count):
             cost = 0.0
-            for a in range(anchors):
-                off = distances[a, v] - expected[p, a]
-                if weight[p, a] > 0.0:
-                    part = weight[p, a] * off * off
-                    cost += part if a < anchors - capped else min(part, cap)
+            for a in range(hard):
+                off = values[v, a] - expected[p, a]
+                cost += weight[p, a] * off * off
+            if cost > most:
+                out[p, v] = np.inf
+                continue
+            for a in range(hard, fields):
+                off = values[v, a] - expected[p, a]
+                cost += min(weight[p, a] * off * off, cap)
             if drawn:
                 x = vertices[v, 0] - near[p, 0]
                 y = vertices[v, 1] - near[p, 1]

@@ -37,9 +37,13 @@ _SIZES = (-0.26, -0.13, 0.0, 0.13)
 
 _OTHER_HAND = 0.7
 _MOVED_M = 0.002
+_ONE_THREAD = 5
+"""Sources up to which starting a second thread takes longer than it saves."""
+
 _TAIL = 4.0
 _REACH_M = 0.008
 _NEAR_CAP = 9.0
+_FAR_M = 10.0
 _STRAIGHT = 0.8
 _OWN_CAP = 6.0
 _QUICK_OWN_CAP = 30.0
@@ -132,9 +136,22 @@ def fit_configuration(
     search = _Search(model, vertices_m, distances_m, hint)
     if hint is not None:
         return search.jointly(hint.b, solver)
-    starts = [search.quickly(search.sized(larger)) for larger in _SIZES]
+    starts = [search.quickly(sized(model, larger)) for larger in _SIZES]
     tried = [search.jointly(b, solver) for b in _different(sorted(starts, key=search.misfit))]
     return min(tried, key=search.disagreement)
+
+
+def sized(model: ConfigurationModel, larger: float) -> FloatArray:
+    """Mode coefficients (k,) of a hand that is larger than the mean by this share."""
+    weight = np.where(np.isfinite(model.sigma_m), model.sigma_m, np.inf) ** -2.0
+    return coefficients(larger * model.mean_m, model.modes_m, weight)
+
+
+def size_share(model: ConfigurationModel, b: FloatArray) -> float:
+    """By which share a hand of these coefficients is larger than the mean."""
+    usual, own = model.expected(np.zeros(len(b)))[0], model.expected(b)[0]
+    hard = slice(None, -OWN_FIELDS)
+    return float(np.nanmean(own[:, hard]) / np.nanmean(usual[:, hard]) - 1.0)
 
 
 def _different(starts: list[FloatArray]) -> list[FloatArray]:
@@ -151,6 +168,7 @@ class _Search:
         self._vertices = np.ascontiguousarray(vertices)
         missing = np.asarray(np.isnan(distances).all(axis=1))
         self._distances = np.ascontiguousarray(np.where(missing[:, None], 0.0, distances))
+        self._values = np.ascontiguousarray(np.minimum(self._distances, _FAR_M).T)
         self._hint = hint
         variance = model.anchor_sigma_m**2 + _MEASURED_SIGMA_M**2
         self._weight = np.where(np.isfinite(variance) & ~missing, 1.0 / variance, 0.0)
@@ -170,7 +188,7 @@ class _Search:
             near, near_weight = self._hint.near_m, 1.0 / self._hint.near_sigma_m**2
         expected = np.nan_to_num(self._model.expected(b)[0])
         anchor_costs(
-            self._distances,
+            self._values,
             expected,
             self._weight,
             self._likely,
@@ -180,6 +198,7 @@ class _Search:
             _NEAR_CAP,
             OWN_FIELDS,
             own_cap or _OWN_CAP,
+            _COST_CAP,
             self._cost,
         )
         return self._cost
@@ -188,12 +207,6 @@ class _Search:
         """How badly a hand of these coefficients fits at all."""
         cost = self._anchor_costs(b, _QUICK_OWN_CAP)[self._likely]
         return float(np.minimum(cost.min(axis=1), _COST_CAP).sum() + b @ b) if len(cost) else np.inf
-
-    def sized(self, larger: float) -> FloatArray:
-        """Coefficients of a hand that is larger by this share."""
-        model = self._model
-        weight = np.where(np.isfinite(model.sigma_m), model.sigma_m, np.inf) ** -2.0
-        return coefficients(larger * model.mean_m, model.modes_m, weight)
 
     def disagreement(self, fit: HandFit) -> float:
         """How badly a joint answer agrees with the model, with its absent points."""
@@ -249,7 +262,8 @@ class _Search:
         moved = np.linalg.norm(self._vertices[vertex] - self._vertices[source], axis=1) > _MOVED_M
         rows = np.flatnonzero(chosen & (moved | (source < 0)))
         if len(rows):
-            fields[rows] = solver.distances([int(v) for v in vertex[rows]])
+            threads = 2 if len(rows) > _ONE_THREAD else 1
+            fields[rows] = solver.distances([int(v) for v in vertex[rows]], threads=threads)
             source[rows] = vertex[rows]
 
     def _pairs(self, fields: FloatArray, vertex: IntArray, chosen: NDArray[np.bool_]) -> FloatArray:

@@ -25,8 +25,9 @@ MISFIT_SCALE = 2.0
 TREE_FLOOR = 0.1
 """Likelihood that is left to a configuration by a tree that denies it: a tree errs in one of ten frames."""
 
-MOST_MISFIT = 22.0
-"""A hand in a learned configuration has a larger misfit in less than 1 % of frames; then it is unknown."""
+MOST_MISFIT = 20.0
+"""A hand in a learned configuration has a larger misfit in 2 % of frames, even if hands of its size and shape
+were never trained on; beyond it, the configuration is unknown."""
 
 LEAST_LIKELIHOOD = 0.6
 """Below it, two configurations are about as likely, and none is told."""

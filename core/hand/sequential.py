@@ -31,6 +31,7 @@ _LEAST_VOTE_SHARE = 0.75
 _SELDOM = 0.2
 _NEIGHBOUR_M = 0.012
 _SWEEPS = 2
+_ALIKE = 0.8
 
 _I, _J = np.array(PAIRS).T
 
@@ -53,7 +54,7 @@ def fit_sequentially(
 ) -> HandFit:
     """Find the points of one configuration as the thesis does; as `fitting.fit_configuration`.
 
-    ``hint`` only breaks ties: the cluster nearest to where the point was is preferred among equal ones.
+    ``hint`` only breaks ties: among clusters of about the same size, the one nearest to where the point was.
     """
     expected, expected_pair = model.expected(np.zeros(len(model.modes_m)))
     anchors = np.asarray(~np.isnan(distances_m).all(axis=1))
@@ -100,7 +101,8 @@ def _vote(
     sizes = np.bincount(labels).astype(float)
     if hint is not None and np.isfinite(hint.near_m[p]).all():
         centres = np.array([vertices_m[candidates[labels == k]].mean(axis=0) for k in range(len(sizes))])
-        sizes -= 0.5 * np.minimum(np.linalg.norm(centres - hint.near_m[p], axis=1) / 0.1, 1.0)
+        off = np.linalg.norm(centres - hint.near_m[p], axis=1)
+        sizes = np.where(sizes > _ALIKE * sizes.max(), 1.0 / (off + 1e-3), 0.0)
     biggest = candidates[labels == int(np.argmax(sizes))]
     return _Point(candidates, len(sizes), _central(vertices_m, biggest))
 

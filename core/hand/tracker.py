@@ -17,10 +17,10 @@ from core.errors import InputError, WorkError
 from core.hand.anchors import AnchorFinder, FoundAnchors
 from core.hand.answer import HandAnswer
 from core.hand.fields import HandFields, measure_fields
-from core.hand.fitting import HandFit, Hint, fit_configuration
+from core.hand.fitting import HandFit, Hint, fit_configuration, size_share, sized
 from core.hand.following import LastSeen, follow, motion_between
 from core.hand.hand_model import HandModel
-from core.hand.judging import Verdict, judge, misfit
+from core.hand.judging import MOST_MISFIT, Verdict, judge, misfit
 from core.hand.names import PAIRS
 from core.hand.sequential import fit_sequentially
 from core.hand.surface import HandSurface, cut_hand
@@ -35,7 +35,9 @@ FULL_CONFIDENCE_M = 0.008
 _DOUBT = 4.0
 _WORSE = 1.6
 _USUAL = 0.8
-_LOOK_ROUND = 6
+_GLANCE = 3
+"""Every so many frames one of the other configurations is looked at, in turn."""
+
 _UNSURE_SHARE, _FOLLOWED_SHARE = 0.6, 0.8
 
 
@@ -74,7 +76,7 @@ class _Past:
     step: RigidTransform = field(default_factory=RigidTransform)
     lost: int = 0
     usual_misfit: float = 0.0
-    since_round: int = 0
+    frames: int = 0
 
 
 class HandTracker:
@@ -171,8 +173,7 @@ class HandTracker:
         motion = follow(past.last, depth_m, self._rig.depth, guess)
         if motion is None:
             return FoundAnchors(found.places_m, False, found.reason), False
-        frames = "1 frame" if past.lost == 1 else f"{past.lost} frames"
-        said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand for {frames}."
+        said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand."
         places = motion.apply(past.last.anchors_m)
         past.motion = motion
         return FoundAnchors(places, False, said), True
@@ -187,29 +188,46 @@ class HandTracker:
             with self._timed("points"):
                 fits[current] = self._fit_one(current, fields, moved)
             worse = misfit(models[current], fits[current])
-            doubtful = worse > _WORSE * past.usual_misfit + _DOUBT
-            past.since_round += 1
-            if options.configuration is None and not doubtful and past.since_round <= _LOOK_ROUND:
-                past.usual_misfit += (1.0 - _USUAL) * (worse - past.usual_misfit)
-                known = Verdict(current, current, {current: 1.0}, {current: worse})
-                return known, fits[current]
+            if options.configuration is None:
+                with self._timed("configuration"):
+                    doubtful = worse > _WORSE * past.usual_misfit + _DOUBT or self._rivalled(
+                        current, worse, fits[current], fields
+                    )
+                if not doubtful:
+                    past.usual_misfit += (1.0 - _USUAL) * (worse - past.usual_misfit)
+                    return Verdict(current, current, {current: 1.0}, {current: worse}), fits[current]
         if options.configuration is None:
             with self._timed("configuration"):
                 for name in models:
                     if name not in fits:
                         fits[name] = self._fit_one(name, fields, moved)
-            past.since_round = 0
         verdict = judge(models, self._model.tree, fits)
         if verdict.configuration is not None and verdict.configuration != past.configuration:
             past.usual_misfit = verdict.misfit[verdict.configuration]
         past.configuration = verdict.configuration
         return verdict, fits[verdict.best]
 
+    def _rivalled(self, current: str, worse: float, fit: HandFit, fields: HandFields) -> bool:
+        """Whether another configuration, one of them every few frames, fits better than the current one."""
+        past, models = self._past, self._model.configurations
+        others = [name for name in models if name != current]
+        past.frames += 1
+        if not others or past.frames % _GLANCE or self._options.refinement != "joint":
+            return False
+        name = others[past.frames // _GLANCE % len(others)]
+        same_size = sized(models[name], size_share(models[current], fit.b))
+        nowhere = np.full(fit.points_m.shape, np.nan)
+        rival = self._look(name, fields, Hint(same_size, nowhere, trust=0.5))
+        return misfit(models[name], rival) < worse
+
     def _fit_one(self, name: str, fields: HandFields, moved: RigidTransform) -> HandFit:
         past = self._past
         hint = None
         if name == past.configuration and name in past.b and past.points_m is not None:
             hint = Hint(past.b[name], moved.apply(past.points_m))
+        return self._look(name, fields, hint)
+
+    def _look(self, name: str, fields: HandFields, hint: Hint | None) -> HandFit:
         fit = fit_configuration if self._options.refinement == "joint" else fit_sequentially
         return fit(
             self._model.configurations[name], fields.surface.vertices, fields.values_m, fields.solver, hint
@@ -226,6 +244,8 @@ class HandTracker:
     ) -> HandAnswer:
         error = np.fmax(fit.anchor_error_m, fit.pair_error_m)
         told = np.isfinite(fit.points_m).all(axis=1) & (error <= self._options.threshold_m)
+        # a hand that is in no learned configuration has its points elsewhere
+        told &= verdict.misfit[verdict.best] <= MOST_MISFIT
         points = np.where(told[:, None], fit.points_m, np.nan)
         confidence = np.where(told, np.exp(-0.5 * (np.nan_to_num(error) / FULL_CONFIDENCE_M) ** 2), 0.0)
         if verdict.configuration is None:
@@ -250,7 +270,7 @@ class HandTracker:
             error_m=error,
             anchors_m=fields.anchors_m,
             marker_seen=anchors.seen,
-            reason=self._reason(anchors, verdict),
+            reason=self._reason(anchors, verdict, bool(told.any())),
             pair_m=np.where(both, fit.pair_m, np.nan),
             expected_pair_m=np.where(both, fit.expected_pair_m, np.nan),
             likelihood=dict(verdict.likelihood),
@@ -264,8 +284,15 @@ class HandTracker:
             anchors_m=anchors.places_m, marker_seen=anchors.seen, reason=reason, times_s=dict(self._times)
         )
 
-    def _reason(self, anchors: FoundAnchors, verdict: Verdict) -> str | None:
+    def _reason(self, anchors: FoundAnchors, verdict: Verdict, told: bool) -> str | None:
         said = [anchors.reason] if anchors.reason is not None else []
         if verdict.configuration is None:
-            said.append("The hand is in none of the configurations that were learned, or between two.")
+            said.append(
+                "The hand is in none of the configurations that were learned, or between two."
+                if self._options.configuration is None
+                else "The hand is not in the configuration that was given."
+            )
+        elif not told:
+            limit_mm = 1000 * self._options.threshold_m
+            said.append(f"No point agrees with the model to within {limit_mm:.0f} mm.")
         return " ".join(said) or None
