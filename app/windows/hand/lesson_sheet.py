@@ -75,7 +75,7 @@ def accuracy_text(confusion: Confusion) -> str:
     right, count = round(confusion.accuracy * confusion.counts.sum()), int(confusion.counts.sum())
     return (
         f"Configuration told rightly in {right} of {count} frames ({confusion.accuracy:.0%}), each frame "
-        f"told by a decision tree that had not seen it ({confusion.folds} parts). Rows: what it is; "
+        f"judged by what was learned without it ({confusion.folds} parts). Rows: what it is; "
         "columns: what was told."
     )
 
@@ -94,20 +94,21 @@ def left_out_text(lesson: Lesson) -> str:
 def confusion_table(confusion: Confusion) -> QTableWidget:
     """The matrix, right answers green, wrong ones red."""
     names = list(confusion.classes)
-    table = QTableWidget(len(names), len(names))
+    told = [*names, "unknown"]
+    table = QTableWidget(len(names), len(told))
     table.setObjectName("hand_lesson_confusion")
     table.setAccessibleName("Confusion matrix: rows what it is, columns what was told")
-    table.setHorizontalHeaderLabels(names)
+    table.setHorizontalHeaderLabels(told)
     table.setVerticalHeaderLabels(names)
     table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
     table.setTabKeyNavigation(False)
     table.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignCenter)
-    table.horizontalHeader().setDefaultSectionSize(max(_CELL, 600 // max(len(names) + 1, 1) // 2))
+    table.horizontalHeader().setDefaultSectionSize(max(_CELL, 600 // (len(told) + 1) // 2))
     table.verticalHeader().setDefaultSectionSize(_ROW)
     table.verticalHeader().setMinimumWidth(100)
     for row in range(len(names)):
-        for column in range(len(names)):
+        for column in range(len(told)):
             count = int(confusion.counts[row, column])
             cell = QTableWidgetItem(str(count))
             cell.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
