@@ -112,6 +112,17 @@ def _of_one_tip(finger: tuple[int, ...]) -> ConfigurationModel:
     return learn_configuration("few", [Glove(s, ALIKE, ON_THE_AXIS).labelled(only=only) for s in SIZES])
 
 
+@pytest.mark.parametrize("finger", [INDEX, LITTLE])
+def test_of_two_clusters_alike_the_one_where_the_point_was_is_taken(finger: tuple[int, ...]) -> None:
+    lone = [Glove(s, ALIKE, ON_THE_AXIS).labelled(only=INDEX[:1]) for s in SIZES]
+    model = learn_configuration("lone", lone)
+    glove = Glove(1.0, ALIKE, ON_THE_AXIS)
+    near = np.full((15, 3), np.nan)
+    near[INDEX[0]] = glove.points_m[finger[0]]
+    fit = fitted(glove, model, Hint(np.zeros(len(model.modes_m)), near))
+    assert np.linalg.norm(fit.points_m[INDEX[0]] - glove.points_m[finger[0]]) < 0.009
+
+
 def test_a_missing_anchor_does_no_harm() -> None:
     glove = Glove(1.0)
     anchors = glove.anchors_m.copy()

@@ -137,8 +137,8 @@ def test_a_configuration_that_was_not_learned_is_said_to_be_unknown(
         assert answer.reason is not None
         assert "none of the configurations" in answer.reason
         assert answer.marker_seen
-        # points of it are guesses, and not told as sure
-        assert answer.confidence.max() <= 0.6
+        # where no configuration fits at all, no point of one is told
+        assert not answer.found.any()
 
 
 def test_points_that_disagree_by_more_than_the_threshold_are_left_out(
@@ -151,6 +151,10 @@ def test_points_that_disagree_by_more_than_the_threshold_are_left_out(
     np.testing.assert_array_equal(strict.error_m, usual.error_m)
     np.testing.assert_array_equal(strict.found, usual.found & (usual.error_m <= limit))
     assert 0 < strict.found.sum() < usual.found.sum()
+    none = tell(tracker(hand_model, shot, threshold_m=0.0), shot)
+    assert not none.found.any()
+    assert none.reason is not None
+    assert "No point agrees" in none.reason
     # more disagreement is less confidence
     order = np.argsort(usual.error_m[usual.found])
     assert (np.diff(usual.confidence[usual.found][order]) <= 0).all()
@@ -165,6 +169,8 @@ def test_a_configuration_known_beforehand_is_the_only_one_tried(hand_model: Hand
     other = shots["fist", "f_27_avg"]
     wrong = tell(tracker(hand_model, other, configuration="open"), other)
     assert wrong.configuration is None
+    assert wrong.reason is not None
+    assert "not in the configuration that was given" in wrong.reason
 
 
 def test_a_configuration_that_was_not_learned_cannot_be_asked_for(
