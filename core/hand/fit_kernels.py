@@ -157,6 +157,25 @@ def weighted_place(
 
 
 @njit(cache=True, nogil=True)
+def steady_vertex(
+    cost: NDArray[np.float64], vertices: NDArray[np.float64], cheapest: int, reach_m: float
+) -> int:
+    """Vertex nearest to the likely place around the cheapest one.
+
+    The cheapest vertex itself jumps between neighbours with the noise, the place does not.
+    """
+    x, y, z, _ = weighted_place(cost, vertices, cheapest, reach_m)
+    best, found = np.inf, cheapest
+    for v in range(len(cost)):
+        if cost[v] < np.inf:
+            dx, dy, dz = vertices[v, 0] - x, vertices[v, 1] - y, vertices[v, 2] - z
+            d = dx * dx + dy * dy + dz * dz
+            if d < best:
+                best, found = d, v
+    return found
+
+
+@njit(cache=True, nogil=True)
 def farthest_beyond(
     away: NDArray[np.float64],
     order: NDArray[np.int64],

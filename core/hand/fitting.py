@@ -32,13 +32,16 @@ _ABSENT_COST = 25.0
 _SELDOM, _OFTEN = 0.05, 0.5
 _ROUNDS = 3
 _SWEEPS = 3
+_HINTED_SWEEPS = 2
 _SIZES = (-0.26, -0.13, 0.0, 0.13)
 """A child's hand is a quarter smaller than what was learned from adults."""
 
 _OTHER_HAND = 0.7
 _MOVED_M = 0.002
-_ONE_THREAD = 5
-"""Sources up to which starting a second thread takes longer than it saves."""
+"""About a vertex: a field is not measured anew for less."""
+_LAST_MOVED_M = 0.004
+"""After the last sweep of a hand that is followed: nothing is solved with these fields any more."""
+
 
 _TAIL = 4.0
 _REACH_M = 0.008
@@ -225,16 +228,18 @@ class _Search:
 
     def jointly(self, b: FloatArray, solver: GeodesicSolver) -> HandFit:
         """Points and coefficients by anchors and by one another."""
-        from core.hand.fit_kernels import joint_costs
+        from core.hand.fit_kernels import joint_costs, steady_vertex
 
         cost = self._anchor_costs(b)
         vertex = cost.argmin(axis=1)
         chosen = cost[np.arange(POINTS), vertex] < _ABSENT_COST
+        for p in np.flatnonzero(chosen):
+            vertex[p] = steady_vertex(cost[p], self._vertices, vertex[p], _REACH_M)
         fields = np.full(cost.shape, np.inf)
         source = np.full(POINTS, -1, np.int64)
         total = np.full(cost.shape, np.inf)
         weight = self._pair_weight()
-        for sweep in range(_SWEEPS):
+        for sweep in range(_SWEEPS if self._hint is None else _HINTED_SWEEPS):
             self._renew(fields, source, vertex, chosen, solver)
             if sweep:
                 b = self._update(b, np.where(chosen, vertex, -1), self._pairs(fields, vertex, chosen))
@@ -246,8 +251,8 @@ class _Search:
                 )
                 chosen[p] = best >= 0 and total[p, best] < _ABSENT_COST
                 if best >= 0:
-                    vertex[p] = best
-        self._renew(fields, source, vertex, chosen, solver)
+                    vertex[p] = steady_vertex(total[p], self._vertices, best, _REACH_M)
+        self._renew(fields, source, vertex, chosen, solver, _MOVED_M if self._hint is None else _LAST_MOVED_M)
         return self._answer(b, vertex, chosen, fields, total)
 
     def _renew(
@@ -257,13 +262,14 @@ class _Search:
         vertex: IntArray,
         chosen: NDArray[np.bool_],
         solver: GeodesicSolver,
+        tolerance_m: float = _MOVED_M,
     ) -> None:
         """Distance fields from the points that have moved since their field was made."""
-        moved = np.linalg.norm(self._vertices[vertex] - self._vertices[source], axis=1) > _MOVED_M
+        moved = np.linalg.norm(self._vertices[vertex] - self._vertices[source], axis=1) > tolerance_m
         rows = np.flatnonzero(chosen & (moved | (source < 0)))
         if len(rows):
-            threads = 2 if len(rows) > _ONE_THREAD else 1
-            fields[rows] = solver.distances([int(v) for v in vertex[rows]], threads=threads)
+            # a field takes half a millisecond: handing it to another thread takes longer
+            fields[rows] = solver.distances([int(v) for v in vertex[rows]], threads=1)
             source[rows] = vertex[rows]
 
     def _pairs(self, fields: FloatArray, vertex: IntArray, chosen: NDArray[np.bool_]) -> FloatArray:

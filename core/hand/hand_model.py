@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from core.hand.anchors import AnchorKind
 from core.hand.marker import DEFAULT_DICTIONARY
-from core.hand.model import ConfigurationModel
+from core.hand.model import OWN_FIELDS, POINTS, ConfigurationModel
 from core.hand.tree import ConfigurationTree
 
 DEFAULT_MARKER_M = 0.036
@@ -34,3 +38,17 @@ class HandModel:
     anchors: AnchorKind = "marker"
     marker_m: float = DEFAULT_MARKER_M
     dictionary: str = DEFAULT_DICTIONARY
+
+    @cached_property
+    def toward_fingers(self) -> NDArray[np.float64]:
+        """Weights (a,) of the anchors, zero in sum, that point from their middle to the fingers.
+
+        Anchors nearer to the points weigh more: of squared distances to a place, those from anchors that lie
+        toward it are smaller in proportion.
+        """
+        squares = []
+        for one in self.configurations.values():
+            of_points = one.mean_m[: POINTS * one.fields].reshape(POINTS, one.fields)[:, :-OWN_FIELDS]
+            squares.append(np.nanmean(of_points**2, axis=0))
+        mean = np.mean(squares, axis=0)
+        return np.asarray(mean.mean() - mean)

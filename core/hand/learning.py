@@ -26,9 +26,6 @@ from core.surface.body_surface import BodySurface
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-STEP_PX = 2
-"""Every so many depth pixels become a vertex: as the tracker does it, so that both measure alike."""
-
 OFF_HAND_M = 0.010
 """A point labelled farther from the measured skin does not lie on it."""
 
@@ -120,7 +117,7 @@ def measure_labelled(capture: RgbdCapture, labels: FrameLabels, finder: AnchorFi
     there = np.isfinite(anchors.places_m).all(axis=1)
     if not there.any():
         raise WorkError(anchors.reason or "No anchors were found.")
-    hand = cut_hand(depth_m, capture.rig.depth, anchors.places_m[there], step_px=STEP_PX)
+    hand = cut_hand(depth_m, capture.rig.depth, anchors.places_m[there])
     labelled, faults = _on_skin(points, labelled, hand.surface)
     fields = measure_fields(hand, anchors.places_m)
     frame, lost = _distances(labels.configuration, fields, points, labelled)

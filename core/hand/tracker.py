@@ -21,7 +21,7 @@ from core.hand.fitting import HandFit, Hint, fit_configuration, size_share, size
 from core.hand.following import LastSeen, follow, motion_between
 from core.hand.hand_model import HandModel
 from core.hand.judging import MOST_MISFIT, Verdict, judge, misfit
-from core.hand.names import PAIRS
+from core.hand.names import PAIRS, POINT_NAMES
 from core.hand.sequential import fit_sequentially
 from core.hand.surface import HandSurface, cut_hand
 
@@ -33,6 +33,7 @@ FULL_CONFIDENCE_M = 0.008
 """A point whose distances disagree by this much has a confidence of 0.6."""
 
 _DOUBT = 4.0
+_SIZE_TRUST = 0.5
 _WORSE = 1.6
 _USUAL = 0.8
 _GLANCE = 3
@@ -77,6 +78,7 @@ class _Past:
     lost: int = 0
     usual_misfit: float = 0.0
     frames: int = 0
+    size: float | None = None
 
 
 class HandTracker:
@@ -130,13 +132,15 @@ class HandTracker:
             return self._nothing(anchors.reason or "The hand was not found.", anchors)
         try:
             with self._timed("surface"):
-                hand = cut_hand(depth_m, self._rig.depth, anchors.places_m)
+                toward = self._model.toward_fingers @ anchors.places_m
+                known = bool(np.isfinite(toward).all())
+                hand = cut_hand(depth_m, self._rig.depth, anchors.places_m, toward=toward if known else None)
         except WorkError as error:
             return self._nothing(str(error), anchors)
         if hand.touching is not None:
             return replace(self._nothing(hand.touching, anchors), surface=hand)
         with self._timed("distances"):
-            fields = measure_fields(hand, anchors.places_m)
+            fields = measure_fields(hand, anchors.places_m, threads=1)
         verdict, fit = self._fit(fields, motion_between(self._before(anchors), anchors.places_m))
         with self._timed("answer"):
             return self._answer(anchors, followed, hand, fields, verdict, fit)
@@ -200,8 +204,10 @@ class HandTracker:
             with self._timed("configuration"):
                 for name in models:
                     if name not in fits:
-                        fits[name] = self._fit_one(name, fields, moved)
+                        fits[name] = self._look(name, fields, self._same_size(name))
         verdict = judge(models, self._model.tree, fits)
+        known = verdict.configuration is not None
+        past.size = size_share(models[verdict.best], fits[verdict.best].b) if known else None
         if verdict.configuration is not None and verdict.configuration != past.configuration:
             past.usual_misfit = verdict.misfit[verdict.configuration]
         past.configuration = verdict.configuration
@@ -215,10 +221,15 @@ class HandTracker:
         if not others or past.frames % _GLANCE or self._options.refinement != "joint":
             return False
         name = others[past.frames // _GLANCE % len(others)]
-        same_size = sized(models[name], size_share(models[current], fit.b))
-        nowhere = np.full(fit.points_m.shape, np.nan)
-        rival = self._look(name, fields, Hint(same_size, nowhere, trust=0.5))
-        return misfit(models[name], rival) < worse
+        past.size = size_share(models[current], fit.b)
+        return misfit(models[name], self._look(name, fields, self._same_size(name))) < worse
+
+    def _same_size(self, name: str) -> Hint | None:
+        """Where to begin with another configuration of a hand whose size is known."""
+        if self._past.size is None:
+            return None
+        nowhere = np.full((len(POINT_NAMES), 3), np.nan)
+        return Hint(sized(self._model.configurations[name], self._past.size), nowhere, trust=_SIZE_TRUST)
 
     def _fit_one(self, name: str, fields: HandFields, moved: RigidTransform) -> HandFit:
         past = self._past
