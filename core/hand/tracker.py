@@ -206,6 +206,13 @@ class HandTracker:
                     if name not in fits:
                         fits[name] = self._look(name, fields, self._same_size(name))
         verdict = judge(models, self._model.tree, fits)
+        if current is not None or past.size is not None:
+            # what the frames before said may be wrong: the likeliest is looked for without it as well
+            with self._timed("configuration"):
+                afresh = self._look(verdict.best, fields, None)
+            if misfit(models[verdict.best], afresh) < verdict.misfit[verdict.best]:
+                fits[verdict.best] = afresh
+                verdict = judge(models, self._model.tree, fits)
         known = verdict.configuration is not None
         past.size = size_share(models[verdict.best], fits[verdict.best].b) if known else None
         if verdict.configuration is not None and verdict.configuration != past.configuration:
