@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from core.evaluation.hand.scores import OUTLIER_M, FrameScore
 from core.evaluation.hand.summaries import by_body
 from core.evaluation.hand_tree_picture import write_tree_picture
 from core.evaluation.thesis.canvas import new_figure, quiet, save, styled
+from core.hand.documents import write_file
 from core.hand.names import BONES, FINGER_OF
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 FINGER_COLORS = ("#ff5a5f", "#ffb400", "#3ddc84", "#2fa8ff", "#c77dff")
 
-_CROP_PX = 20
+_CROP_PX = 30
 _COLUMNS = 4
 _LINE, _LINE_OTHER, _BAD = "#1f7a8c", "#b9a36b", "#c0392b"
 
@@ -45,7 +47,8 @@ def draw_pictures(outcome: Outcome, sets: HandSets, marker: FinderMaker, folder:
         with styled():
             figure = draw()
             if figure is not None:
-                out.append(save(figure, folder / name))
+                photo = name.endswith(".jpg")
+                out.append((save_photos if photo else save)(figure, folder / name))
 
     scores = outcome.scores
     for key in ("three", "five"):
@@ -54,7 +57,7 @@ def draw_pictures(outcome: Outcome, sets: HandSets, marker: FinderMaker, folder:
             path = folder / f"figure-14-tree-{key}.png"
             write_tree_picture(path, one.model.tree)
             out.append(path)
-    drawn("figure-13-configurations.png", lambda: configurations_figure(scores.get("stills six", []), sets))
+    drawn("figure-13-configurations.jpg", lambda: configurations_figure(scores.get("stills six", []), sets))
     if "marker" in outcome.models:
         from core.evaluation.hand.candidates_picture import candidates_figure
 
@@ -64,10 +67,18 @@ def draw_pictures(outcome: Outcome, sets: HandSets, marker: FinderMaker, folder:
         lambda: errors_figure(scores.get("large joint", []), scores.get("large sequential", [])),
     )
     passing = [s for s in scores.get("occlusion 12", []) if s.remark]
-    drawn("figure-17-occlusion.png", lambda: sequence_figure(passing, sets.occluded))
-    drawn("figure-18-bottle.png", lambda: sequence_figure(scores.get("bottle", []), sets.bottle))
+    drawn("figure-17-occlusion.jpg", lambda: sequence_figure(passing, sets.occluded))
+    drawn("figure-18-bottle.jpg", lambda: sequence_figure(scores.get("bottle", []), sets.bottle))
     drawn("marker-lost.png", lambda: errors_figure(scores.get("lost", []), []))
     return out
+
+
+def save_photos(figure: Figure, path: Path) -> Path:
+    """Write a JPEG, whole or not at all: photographs in 256 colours lose the colours of small things."""
+    content = io.BytesIO()
+    figure.savefig(content, format="jpg", dpi=110, facecolor="white", pil_kwargs={"quality": 88})
+    write_file(path, content.getvalue())
+    return path
 
 
 def configurations_figure(scores: Sequence[FrameScore], sets: HandSets) -> Figure | None:
@@ -97,7 +108,8 @@ def pictures_figure(scores: Sequence[FrameScore], sets: Sequence[FrameSet], colu
     """Told points and bones in the pictures; true places of visible points as small crosses."""
     if not scores:
         return None
-    frames = frames_named({score.name for score in scores}, sets)
+    bodies = {score.body for score in scores}
+    frames = frames_named({score.name for score in scores}, [one for one in sets if one.body in bodies])
     rows = -(-len(scores) // columns)
     figure = new_figure(2.3 * columns, 2.6 * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
