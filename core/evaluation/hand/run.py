@@ -31,17 +31,17 @@ from core.hand.hand_model import HandModel
 from core.hand.landmarks import HandDetector
 from core.progress import Progress, no_progress
 
-BALANCED: Final = 60
-"""Training frames of every configuration where there are five or six: five of each hand."""
+BALANCED: Final = 48
+"""Training frames of every configuration where there are five or six: four of each hand."""
 
 SIX_TEST_FRAMES: Final = 168
-FEW_TEST_FRAMES: Final = 140
+FEW_TEST_FRAMES: Final = 70
 """Test frames for six configurations, and for what was learned from a few frames."""
 
 UNLEARNED_TEST_FRAMES: Final = 28
 """Test frames of a configuration that was not learned."""
 
-OWN_HANDS: Final = 3
+OWN_HANDS: Final = 2
 """Hands that are followed by a model of their own."""
 
 THESIS_TRAINING: Final = 300
