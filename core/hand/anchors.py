@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,12 @@ from core.capture.rgbd import CameraRig
 FloatArray = NDArray[np.float64]
 
 AnchorKind = Literal["marker", "palm"]
+
+MIRRORED_ORDER: Final[dict[AnchorKind, tuple[int, ...]]] = {
+    "marker": (1, 0, 3, 2),
+    "palm": (0, 4, 3, 2, 1),
+}
+"""Order of the anchors in which the other hand of a pair has them where this one has its own."""
 
 
 @dataclass(frozen=True, eq=False)

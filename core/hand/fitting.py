@@ -22,7 +22,9 @@ IntArray = NDArray[np.int64]
 
 _I, _J = np.array(PAIRS).T
 
-_MEASURED_SIGMA_M = 0.002
+MEASURED_SIGMA_M = 0.002
+"""Of a distance along the skin, measured from an anchor that is seen."""
+
 _PAIR_SIGMA_M = 0.003
 _COST_CAP = 60.0
 _PAIR_CAP = 9.0
@@ -122,6 +124,7 @@ def fit_configuration(
     distances_m: FloatArray,
     solver: GeodesicSolver,
     hint: Hint | None = None,
+    measured_sigma_m: float = MEASURED_SIGMA_M,
 ) -> HandFit:
     """Find the points of one configuration.
 
@@ -135,8 +138,10 @@ def fit_configuration(
         Of the same surface.
     hint : Hint, optional
         Without it several sizes of hand are tried.
+    measured_sigma_m : float
+        Of the measured distances; larger where the anchors are less sure than usual.
     """
-    search = _Search(model, vertices_m, distances_m, hint)
+    search = _Search(model, vertices_m, distances_m, hint, measured_sigma_m)
     if hint is not None:
         return search.jointly(hint.b, solver)
     starts = [search.quickly(sized(model, larger)) for larger in _SIZES]
@@ -165,7 +170,12 @@ def _different(starts: list[FloatArray]) -> list[FloatArray]:
 
 class _Search:
     def __init__(
-        self, model: ConfigurationModel, vertices: FloatArray, distances: FloatArray, hint: Hint | None
+        self,
+        model: ConfigurationModel,
+        vertices: FloatArray,
+        distances: FloatArray,
+        hint: Hint | None,
+        measured_sigma_m: float,
     ) -> None:
         self._model = model
         self._vertices = np.ascontiguousarray(vertices)
@@ -173,11 +183,11 @@ class _Search:
         self._distances = np.ascontiguousarray(np.where(missing[:, None], 0.0, distances))
         self._values = np.ascontiguousarray(np.minimum(self._distances, _FAR_M).T)
         self._hint = hint
-        variance = model.anchor_sigma_m**2 + _MEASURED_SIGMA_M**2
+        variance = model.anchor_sigma_m**2 + measured_sigma_m**2
         self._weight = np.where(np.isfinite(variance) & ~missing, 1.0 / variance, 0.0)
         self._missing = missing
         self._likely = (model.seen > _SELDOM) & (self._weight > 0).any(axis=1)
-        variance = model.sigma_m**2 + _MEASURED_SIGMA_M**2
+        variance = model.sigma_m**2 + measured_sigma_m**2
         self._inverse = np.where(np.isfinite(variance), 1.0 / variance, 0.0)
         self._inverse[POINTS * model.fields :] *= _PAIR_WEIGHT  # pairs repeat what the points say
         self._cost = np.empty((POINTS, len(vertices)))

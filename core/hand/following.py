@@ -1,29 +1,39 @@
 """Where a hand has gone since the marker was last seen: by the shape of its surface.
 
-The surface of the last frame with a marker is laid onto the depth image of this one (projective point-to-
-plane registration; Chen and Medioni 1991, Blais and Levine 1995), beginning where the motion so far would
-have taken it. Fingers that have bent since weigh little.
+The surface of the last frame with a marker is laid onto the surface of this one (iterative closest points;
+Besl and McKay 1992, Chen and Medioni 1991), beginning where the motion so far would have taken it. Its inner
+points are drawn to the planes of the new surface, and may slide along them: a back of a hand is nearly flat.
+Its outline is drawn to the new outline, which holds it. Fingers that have bent since weigh little.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from core.capture.camera import PinholeCamera
 from core.capture.transform import RigidTransform
+from core.errors import WorkError
+from core.hand.surface import cut_hand
 from core.surface.body_surface import BodySurface
 
 FloatArray = NDArray[np.float64]
 
-_MOST_POINTS = 900
-_GATES_M = (0.04, 0.04, 0.03, 0.03, 0.02, 0.02, 0.012, 0.012, 0.012, 0.012)
-_STARTS_M = (0.0, 0.02)
-_SCALE_M = 0.004
-_LEAST_SHARE = 0.45
-_MOST_RESIDUAL_M = 0.005
+_MOST_INNER, _MOST_RIM = 500, 250
+REACH_M = 0.16
+"""A hand's fingertips are nearer to the middle of its anchors."""
+
+_BEHIND_M = 0.03
+_GATES_M = (0.05, 0.05, 0.04, 0.04, 0.03, 0.03, 0.02, 0.02, 0.015, 0.015, 0.015, 0.015)
+_SCALE_M = 0.006
+_RIM_WEIGHT = 0.5
+_LEAST = 30
+_BEST = 0.65
+_MOST_DISAGREEMENT_M = 0.0042
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,28 +42,55 @@ class LastSeen:
 
     Attributes
     ----------
-    points_m, normals : ndarray (n, 3)
+    inner_m : ndarray (n, 3)
         Some of its surface.
+    rim_m : ndarray (k, 3)
+        Some of its outline, without that of the forearm.
     anchors_m : ndarray (a, 3)
     """
 
-    points_m: FloatArray
-    normals: FloatArray
+    inner_m: FloatArray
+    rim_m: FloatArray
     anchors_m: FloatArray
 
     @classmethod
-    def of(cls, surface: BodySurface, anchors_m: FloatArray, reach_m: float = 0.13) -> LastSeen:
-        """Keep what lies within reach of the anchors."""
-        centre = np.nanmean(anchors_m, axis=0)
-        near = np.flatnonzero(
-            (((surface.vertices - centre) ** 2).sum(axis=1) < reach_m**2) & ~surface.boundary
+    def of(
+        cls,
+        surface: BodySurface,
+        anchors_m: FloatArray,
+        toward: FloatArray | None = None,
+        reach_m: float = REACH_M,
+    ) -> LastSeen:
+        """Keep what lies within reach of the anchors.
+
+        Parameters
+        ----------
+        surface : BodySurface
+        anchors_m : ndarray (a, 3)
+        toward : ndarray (3,), optional
+            Direction to the fingers; the outline behind the anchors is the forearm's, which says nothing.
+        reach_m : float
+            From the middle of the anchors.
+        """
+        off = surface.vertices - np.nanmean(anchors_m, axis=0)
+        near = (off**2).sum(axis=1) < reach_m**2
+        inner = np.flatnonzero(near & ~surface.boundary)
+        rim = near & surface.boundary
+        if toward is not None:
+            rim &= off @ (toward / np.linalg.norm(toward)) > -_BEHIND_M
+        return cls(
+            surface.vertices[_some(inner, _MOST_INNER)],
+            surface.vertices[_some(np.flatnonzero(rim), _MOST_RIM)],
+            anchors_m,
         )
-        some = near[:: max(1, len(near) // _MOST_POINTS)]
-        return cls(surface.vertices[some], surface.normals[some], anchors_m)
+
+
+def _some(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    return rows[:: max(1, len(rows) // most)]
 
 
 def follow(
-    last: LastSeen, depth_m: FloatArray, camera: PinholeCamera, guess: RigidTransform
+    last: LastSeen, depth_m: FloatArray, camera: PinholeCamera, guesses: Sequence[RigidTransform]
 ) -> RigidTransform | None:
     """Motion ``now_from_then`` of the hand since it was last seen; None if the surface does not fit anywhere.
 
@@ -63,78 +100,113 @@ def follow(
     depth_m : ndarray (h, w)
         Metres, 0 for no measurement.
     camera : PinholeCamera
-    guess : RigidTransform
-        Motion that is expected.
+    guesses : sequence of RigidTransform
+        Motions that are expected, the likeliest first: a hand that is shaken turns back from one frame to
+        the next. The one that leads to the best fit is taken.
     """
-    best: tuple[float, RigidTransform] | None = None
-    for start in _starts(guess):
-        motion = start
-        for gate in _GATES_M:
-            matched = _match(last, depth_m, camera, motion, gate)
-            if matched is None:
-                break
-            motion = _step(*matched[:3], motion)
-        else:
-            matched = _match(last, depth_m, camera, motion, _GATES_M[-1])
-            if matched is not None and matched[3] >= _LEAST_SHARE:
-                residual = float(np.median(np.abs(matched[2])))
-                if residual < _MOST_RESIDUAL_M and (best is None or residual < best[0]):
-                    best = residual, motion
-        if best is not None and start is guess:
-            break
-    return None if best is None else best[1]
-
-
-def _starts(guess: RigidTransform) -> list[RigidTransform]:
-    """The guess, and places beside it that are tried if it leads nowhere."""
-    found = [guess]
-    for axis in (0, 1, 2):
-        for sign in (-1.0, 1.0):
-            shift = np.zeros(3)
-            shift[axis] = sign * _STARTS_M[1]
-            found.append(RigidTransform(guess.rotation, guess.translation + shift))
-    return found
-
-
-def _match(
-    last: LastSeen, depth_m: FloatArray, camera: PinholeCamera, motion: RigidTransform, gate_m: float
-) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
-    """Moved points, their normals and their distances to the surface of now, and the share that has one."""
-    points = motion.apply(last.points_m)
-    normals = last.normals @ motion.rotation.T
-    pixels = camera.project(points)
-    inside = np.isfinite(pixels).all(axis=1)
-    u, v = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(np.int64).T
-    inside &= (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    u, v = np.where(inside, u, 0), np.where(inside, v, 0)
-    z = depth_m[v, u]
-    rays = camera.pixel_rays[v, u]
-    off = ((rays * z[:, None] - points) * normals).sum(axis=1)
-    good = inside & (z > 0) & (np.abs(z - points[:, 2]) < 2 * gate_m) & (np.abs(off) < gate_m)
-    share = float(good.mean())
-    if good.sum() < 30:
+    now = None
+    for guess in guesses:
+        try:
+            surface = cut_hand(depth_m, camera, guess.apply(last.anchors_m)).surface
+        except WorkError:
+            continue
+        now = _Now(surface, cKDTree(surface.vertices), cKDTree(surface.vertices[surface.boundary]))
+        break
+    if now is None:
         return None
-    return points[good], normals[good], off[good], share
+    found = []
+    for guess in (*guesses, _same_middle(last, now, guesses[0])):
+        motion = _laid_on(last, now, guess)
+        if motion is not None:
+            found.append((_disagreement(last, now, motion), motion))
+    if not found:
+        return None
+    least, best = min(found, key=lambda one: one[0])
+    return best if least < _MOST_DISAGREEMENT_M else None
 
 
-def _step(points: FloatArray, normals: FloatArray, off: FloatArray, motion: RigidTransform) -> RigidTransform:
-    """One Gauss-Newton step of the robust point-to-plane distance."""
-    centre = points.mean(axis=0)
-    rows = np.hstack([np.cross(points - centre, normals), normals])
-    weight = 1.0 / (1.0 + (off / _SCALE_M) ** 2)
-    normal = (rows * weight[:, None]).T @ rows
-    # a back of a hand can slide in its plane: what the data do not say stays as it was
-    normal += np.diag([1e-5, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2]) * len(rows)
-    change = np.linalg.solve(normal, rows.T @ (weight * off))
-    angle = float(np.linalg.norm(change[:3]))
-    turn = np.eye(3)
-    if angle > 1e-12:
-        axis = change[:3] / angle
-        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-        turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+def _same_middle(last: LastSeen, now: _Now, guess: RigidTransform) -> RigidTransform:
+    """The guess, shifted so that the middles of both outlines fall together."""
+    rim = guess.apply(last.rim_m) if len(last.rim_m) else guess.apply(last.inner_m)
+    reach = np.linalg.norm(now.rim.data - rim.mean(axis=0), axis=1) < REACH_M
+    if not reach.any():
+        return guess
+    shift = now.rim.data[reach].mean(axis=0) - rim.mean(axis=0)
+    return RigidTransform(guess.rotation, guess.translation + shift)
+
+
+def _laid_on(last: LastSeen, now: _Now, guess: RigidTransform) -> RigidTransform | None:
+    motion = guess
+    for gate in _GATES_M:
+        step = _step(last, now, motion, gate)
+        if step is None:
+            return None
+        motion = step
+    return motion
+
+
+@dataclass(frozen=True, eq=False)
+class _Now:
+    """The surface of this frame, to be searched."""
+
+    surface: BodySurface
+    every: cKDTree
+    rim: cKDTree
+
+
+def _step(last: LastSeen, now: _Now, motion: RigidTransform, gate_m: float) -> RigidTransform | None:
+    """One Gauss-Newton step of the robust distances; None if too little is near."""
+    inner, rim = motion.apply(last.inner_m), motion.apply(last.rim_m)
+    far, nearest = now.every.query(inner, distance_upper_bound=gate_m)
+    good = np.isfinite(far)
+    if good.sum() < _LEAST:
+        return None
+    normals = now.surface.normals[nearest[good]]
+    off = ((now.surface.vertices[nearest[good]] - inner[good]) * normals).sum(axis=1)
+    centre = inner.mean(axis=0)
+    rows = [np.hstack([np.cross(inner[good] - centre, normals), normals])]
+    wanted, weight = [off], [1.0 / (1.0 + (off / _SCALE_M) ** 2)]
+    far, nearest = now.rim.query(rim, distance_upper_bound=gate_m)
+    good = np.isfinite(far)
+    if good.any():
+        gap = now.rim.data[nearest[good]] - rim[good]
+        share = _RIM_WEIGHT / (1.0 + (far[good] / _SCALE_M) ** 2)
+        for axis in np.eye(3):
+            along = np.broadcast_to(axis, gap.shape)
+            rows.append(np.hstack([np.cross(rim[good] - centre, along), along]))
+            wanted.append(gap @ axis)
+            weight.append(share)
+    matrix, right, w = np.vstack(rows), np.concatenate(wanted), np.concatenate(weight)
+    normal = (matrix * w[:, None]).T @ matrix
+    # what the data do not say stays as it was
+    normal += np.diag([1e-5] * 3 + [1e-2] * 3) * len(inner)
+    change = np.linalg.solve(normal, matrix.T @ (w * right))
+    turn = _rotation(change[:3])
     rotation = turn @ motion.rotation
-    translation = turn @ (motion.translation - centre) + centre + change[3:]
-    return RigidTransform(rotation, translation)
+    return RigidTransform(rotation, turn @ (motion.translation - centre) + centre + change[3:])
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    """Rotation matrix (3, 3) of a rotation vector."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+def _disagreement(last: LastSeen, now: _Now, motion: RigidTransform) -> float:
+    """Mean distance of the hand's surface and outline from the new ones.
+
+    A hand that turns shows other parts of itself, and something may be before it: a third counts nothing.
+    """
+    parts = [_of_the_best(now.every.query(motion.apply(last.inner_m))[0])]
+    if len(last.rim_m):
+        parts.append(_of_the_best(now.rim.query(motion.apply(last.rim_m))[0]))
+    return float(np.mean(parts))
+
+
+def _of_the_best(distances: FloatArray) -> float:
+    """Mean of the nearest two thirds."""
+    return float(np.sort(distances)[: max(1, round(_BEST * len(distances)))].mean())
 
 
 def motion_between(before_m: FloatArray, after_m: FloatArray) -> RigidTransform:

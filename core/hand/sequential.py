@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.geodesics.solver import GeodesicSolver
-from core.hand.fitting import HandFit, Hint
+from core.hand.fitting import MEASURED_SIGMA_M, HandFit, Hint
 from core.hand.model import OWN_FIELDS, POINTS, ConfigurationModel
 from core.hand.names import FINGER_OF, PAIRS
 
@@ -51,6 +51,7 @@ def fit_sequentially(
     distances_m: FloatArray,
     solver: GeodesicSolver,
     hint: Hint | None = None,
+    measured_sigma_m: float = MEASURED_SIGMA_M,
 ) -> HandFit:
     """Find the points of one configuration as the thesis does; as `fitting.fit_configuration`.
 
@@ -59,9 +60,10 @@ def fit_sequentially(
     expected, expected_pair = model.expected(np.zeros(len(model.modes_m)))
     anchors = np.asarray(~np.isnan(distances_m).all(axis=1))
     anchors[-OWN_FIELDS:] = False
+    extra = max(measured_sigma_m - MEASURED_SIGMA_M, 0.0)
     found: dict[int, _Point] = {}
     for p in np.flatnonzero(model.seen > _SELDOM):
-        point = _vote(model, vertices_m, distances_m, anchors, int(p), hint)
+        point = _vote(model, vertices_m, distances_m, anchors, int(p), hint, BAND_M + extra)
         if point is not None:
             found[int(p)] = point
     fields = {p: solver.distances([point.vertex])[0] for p, point in found.items()}
@@ -81,13 +83,14 @@ def _vote(
     anchors: NDArray[np.bool_],
     p: int,
     hint: Hint | None,
+    band_m: float,
 ) -> _Point | None:
     """Candidates (the histogram's highest bin), and the centre of the biggest cluster."""
     wanted = model.expected(np.zeros(len(model.modes_m)))[0][p, anchors]
     known = np.isfinite(wanted)
     if not known.any():
         return None
-    band = BAND_M + np.nan_to_num(model.anchor_sigma_m[p, anchors][known])
+    band = band_m + np.nan_to_num(model.anchor_sigma_m[p, anchors][known])
     off = np.abs(distances_m[anchors][known] - wanted[known, None])
     votes = (off < band[:, None]).sum(axis=0)
     most = int(votes.max())

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from core.capture.rgbd import CameraRig
 from core.capture.transform import RigidTransform
 from core.errors import InputError, WorkError
-from core.hand.anchors import AnchorFinder, FoundAnchors
+from core.hand.anchors import MIRRORED_ORDER, AnchorFinder, FoundAnchors
 from core.hand.answer import HandAnswer
 from core.hand.fields import HandFields, measure_fields
-from core.hand.fitting import HandFit, Hint, fit_configuration, size_share, sized
+from core.hand.fitting import MEASURED_SIGMA_M, HandFit, Hint, fit_configuration, size_share, sized
 from core.hand.following import LastSeen, follow, motion_between
 from core.hand.hand_model import HandModel
 from core.hand.judging import MOST_MISFIT, Verdict, judge, misfit
+from core.hand.model import OWN_FIELDS
 from core.hand.names import PAIRS, POINT_NAMES
 from core.hand.sequential import fit_sequentially
 from core.hand.surface import HandSurface, cut_hand
@@ -32,6 +33,14 @@ Refinement = Literal["joint", "sequential"]
 FULL_CONFIDENCE_M = 0.008
 """A point whose distances disagree by this much has a confidence of 0.6."""
 
+FOLLOWED_SIGMA_M = 0.005
+"""Of distances from anchors that were not seen but followed: they are off by 2 to 7 mm."""
+
+OTHER_HAND = (
+    "It looks like the other hand of the pair: the model was learned from a left or a right one only."
+)
+
+_CLEARLY = 0.6
 _DOUBT = 4.0
 _SIZE_TRUST = 0.5
 _WORSE = 1.6
@@ -79,6 +88,15 @@ class _Past:
     usual_misfit: float = 0.0
     frames: int = 0
     size: float | None = None
+    own_hand: bool = False
+
+    def guesses(self) -> list[RigidTransform]:
+        """Motions since the hand was last seen: going on, staying, and turning back as when shaken."""
+        on = RigidTransform(
+            self.step.rotation @ self.motion.rotation, self.step.apply(self.motion.translation)
+        )
+        back = RigidTransform(self.motion.rotation, 2 * self.motion.translation - on.translation)
+        return [on, self.motion, back]
 
 
 class HandTracker:
@@ -141,6 +159,8 @@ class HandTracker:
             return replace(self._nothing(hand.touching, anchors), surface=hand)
         with self._timed("distances"):
             fields = measure_fields(hand, anchors.places_m, threads=1)
+        if self._other_hand(fields):
+            return replace(self._nothing(OTHER_HAND, anchors), surface=hand)
         verdict, fit = self._fit(fields, motion_between(self._before(anchors), anchors.places_m))
         with self._timed("answer"):
             return self._answer(anchors, followed, hand, fields, verdict, fit)
@@ -161,6 +181,7 @@ class HandTracker:
         near = past.anchors_m if past.lost == 0 else None
         found = self._finder.find(rgb, depth_m, self._rig, near)
         if found.seen:
+            past.lost = 0
             return found, False
         past.lost += 1
         if past.last is None or past.lost > self._options.lost_frames:
@@ -171,10 +192,7 @@ class HandTracker:
                 self.reset()
                 return FoundAnchors(found.places_m, False, said), False
             return found, False
-        guess = RigidTransform(
-            past.step.rotation @ past.motion.rotation, past.step.apply(past.motion.translation)
-        )
-        motion = follow(past.last, depth_m, self._rig.depth, guess)
+        motion = follow(past.last, depth_m, self._rig.depth, past.guesses())
         if motion is None:
             return FoundAnchors(found.places_m, False, found.reason), False
         said = f"{found.reason or 'The marker is lost.'} Followed by the shape of the hand."
@@ -231,6 +249,25 @@ class HandTracker:
         past.size = size_share(models[current], fit.b)
         return misfit(models[name], self._look(name, fields, self._same_size(name))) < worse
 
+    def _other_hand(self, fields: HandFields) -> bool:
+        """Whether it is the other hand of the pair: asked until one of the two has fitted clearly better."""
+        past, models = self._past, self._model.configurations
+        order = MIRRORED_ORDER[self._model.anchors]
+        if past.own_hand or len(order) + OWN_FIELDS != len(fields.values_m):
+            return False
+        mirrored = fields.values_m[[*order, *range(len(order), len(fields.values_m))]]
+        vertices, solver = fields.surface.vertices, fields.solver
+        with self._timed("configuration"):
+            own, other = (
+                min(
+                    misfit(model, fit_configuration(model, vertices, values, solver))
+                    for model in models.values()
+                )
+                for values in (fields.values_m, mirrored)
+            )
+        past.own_hand = own < _CLEARLY * other
+        return other < _CLEARLY * own
+
     def _same_size(self, name: str) -> Hint | None:
         """Where to begin with another configuration of a hand whose size is known."""
         if self._past.size is None:
@@ -248,7 +285,12 @@ class HandTracker:
     def _look(self, name: str, fields: HandFields, hint: Hint | None) -> HandFit:
         fit = fit_configuration if self._options.refinement == "joint" else fit_sequentially
         return fit(
-            self._model.configurations[name], fields.surface.vertices, fields.values_m, fields.solver, hint
+            self._model.configurations[name],
+            fields.surface.vertices,
+            fields.values_m,
+            fields.solver,
+            hint,
+            FOLLOWED_SIGMA_M if self._past.lost else MEASURED_SIGMA_M,
         )
 
     def _answer(
@@ -277,7 +319,9 @@ class HandTracker:
         past.anchors_m = anchors.places_m
         if not followed:
             past.lost, past.motion = 0, RigidTransform()
-            past.last = LastSeen.of(hand.surface, anchors.places_m)
+            toward = self._model.toward_fingers @ anchors.places_m
+            known = bool(np.isfinite(toward).all())
+            past.last = LastSeen.of(hand.surface, anchors.places_m, toward if known else None)
         i, j = np.array(PAIRS).T
         both = told[i] & told[j]
         return HandAnswer(
