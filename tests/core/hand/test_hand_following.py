@@ -92,7 +92,7 @@ def test_what_is_kept_of_a_hand_is_its_skin_near_the_anchors() -> None:
     assert not {tuple(p) for p in kept.rim_m} & {tuple(p) for p in kept.inner_m}
     of_four = BEFORE.apply(np.vstack([BALL_ANCHORS_M, [(0.0, 0.0, 0.0)]]))
     of_four[3] = np.nan
-    np.testing.assert_array_equal(LastSeen.of(surface, of_four, reach_m=0.06).points_m, kept.inner_m)
+    np.testing.assert_array_equal(LastSeen.of(surface, of_four, reach_m=0.06).inner_m, kept.inner_m)
 
 
 @given(degrees=angles, step_m=steps)
