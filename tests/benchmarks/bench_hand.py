@@ -22,7 +22,7 @@ from typing import Any
 from app.cli.evaluate_hand import CACHE_VARIABLE, hand_run
 from core.evaluation.hand.tables import spread_words
 
-EXPERIMENTS = ("large", "palm", "occlusion", "bottle", "lost", "classifier")
+EXPERIMENTS = ("large", "lost", "occlusion", "bottle", "classifier", "palm")
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "docs" / "benchmarks" / "hand"
 REAL = ROOT.parent / "shared" / "real" / "hand_depth"
