@@ -124,8 +124,8 @@ def _first_places(wanted: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
 def changes_between_people(flat: FlatHand, *, rigid_anchors: bool) -> FloatArray:
     """How distances differ from one hand and one session to another, each row one standard deviation.
 
-    Size of the hand (10 %: children, men), and a marker that sits 3 mm or 5 degrees elsewhere. Any number of
-    frames of one hand says nothing about it.
+    Size of the hand (10 %: children, men), and a marker that sits 1.5 mm or 2.5 degrees elsewhere. Any number
+    of frames of one hand says nothing about it.
 
     Parameters
     ----------

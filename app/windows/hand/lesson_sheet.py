@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from core.hand.learning import Confusion, Lesson
 
 _MOST_ROWS = 6
-_CELL, _ROW = 76, 32
+_CELL, _ROW = 92, 32
 
 
 class LessonSheet(Sheet):
