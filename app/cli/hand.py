@@ -44,7 +44,7 @@ class Refinement(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the command group."""
-    from app.cli import hand_simulate, hand_window
+    from app.cli import hand_marker, hand_simulate, hand_window
 
     group = typer.Typer(
         help="Joints of a hand by geodesics.", no_args_is_help=True, pretty_exceptions_enable=False
@@ -52,6 +52,7 @@ def register(app: typer.Typer) -> None:
     group.callback()(_group)
     group.command("train")(train)
     group.command("track")(track)
+    hand_marker.register(group)
     hand_simulate.register(group)
     hand_window.register(group)
     app.add_typer(group, name="hand")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg")
 
-_DEEPEST = 7
+_DEEPEST = 4
 _COLORS = ("#1f77b4", "#d95f02", "#1b7837", "#7b3294", "#b8860b", "#c51b7d", "#4d4d4d", "#2c7fb8")
 _LEAF_IN, _LEVEL_IN = 1.75, 1.15
 _WIDEST_IN, _HIGHEST_IN = 120.0, 40.0
@@ -40,7 +40,7 @@ def question(tree: ConfigurationTree, node: int) -> str:
 def tree_figure(tree: ConfigurationTree) -> Figure:
     """The tree from its root down: questions with thresholds, leaves with configuration and training frames.
 
-    Below the eighth level only what lies there most is told.
+    Below the fifth level only what lies there most is told.
     """
     places = {placed.node: placed for placed in _placed(tree)}
     across = 1.0 + max(placed.x for placed in places.values())
