@@ -100,7 +100,10 @@ def test_a_change_is_the_difference_that_a_small_motion_makes(seed: int) -> None
     points, anchors = rng.normal(0.0, 0.002, (15, 2)), rng.normal(0.0, 0.002, (4, 2))
     moved = FlatHand(flat.points_m + 0.01 * points, flat.anchors_m + 0.01 * anchors)
     difference = moved.distances() - flat.distances()
-    np.testing.assert_allclose(0.01 * flat.change(points, anchors), difference, atol=2e-6)
+    # linear: what moves by a part of its own distance is left out
+    apart = flat.distances() > 0.005
+    assert apart.mean() > 0.8
+    np.testing.assert_allclose((0.01 * flat.change(points, anchors))[apart], difference[apart], atol=2e-6)
 
 
 def test_a_larger_hand_with_the_same_marker() -> None:
