@@ -20,7 +20,7 @@ from core.hand.fields import HandFields, measure_fields
 from core.hand.fitting import MEASURED_SIGMA_M, HandFit, Hint, fit_configuration, size_share, sized
 from core.hand.following import LastSeen, follow, motion_between
 from core.hand.hand_model import HandModel
-from core.hand.judging import MOST_MISFIT, Verdict, judge, misfit
+from core.hand.judging import Verdict, judge, misfit
 from core.hand.model import OWN_FIELDS
 from core.hand.names import PAIRS, POINT_NAMES
 from core.hand.sequential import fit_sequentially
@@ -35,6 +35,10 @@ FULL_CONFIDENCE_M = 0.008
 
 FOLLOWED_SIGMA_M = 0.005
 """Of distances from anchors that were not seen but followed: they are off by 2 to 7 mm."""
+
+MOST_TOLD_MISFIT = 32.0
+"""Up to it the points of the likeliest configuration are told, each by its own error, even if it is not told
+itself; an open hand has 40 to 80 in a model of fist and outstretched index finger."""
 
 OTHER_HAND = (
     "It looks like the other hand of the pair: the model was learned from a left or a right one only."
@@ -304,8 +308,8 @@ class HandTracker:
     ) -> HandAnswer:
         error = np.fmax(fit.anchor_error_m, fit.pair_error_m)
         told = np.isfinite(fit.points_m).all(axis=1) & (error <= self._options.threshold_m)
-        # a hand that is in no learned configuration has its points elsewhere
-        told &= verdict.misfit[verdict.best] <= MOST_MISFIT
+        # a hand that is far from every learned configuration has its points elsewhere
+        told &= verdict.misfit[verdict.best] <= MOST_TOLD_MISFIT
         points = np.where(told[:, None], fit.points_m, np.nan)
         confidence = np.where(told, np.exp(-0.5 * (np.nan_to_num(error) / FULL_CONFIDENCE_M) ** 2), 0.0)
         if verdict.configuration is None:
