@@ -226,7 +226,7 @@ def test_clicks_become_labels_labels_a_model_and_the_model_tracks(
     assert "8 frames" in hands.text("hand_lesson_used")
     assert "8 frames" in hands.text("hand_lesson_accuracy")
     table: Any = hands.find("hand_lesson_confusion")
-    assert sum(int(table.item(r, c).text()) for r in range(2) for c in range(2)) == 8
+    assert sum(int(table.item(r, c).text()) for r in range(2) for c in range(3)) == 8
     model = tmp_path / "model.json"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(model), ""))
     hands.click("hand_lesson_save")
