@@ -9,13 +9,13 @@ from core.errors import InputError
 from core.hand.anchors import AnchorFinder, AnchorKind
 from core.hand.hand_model import DEFAULT_MARKER_M, HandModel
 from core.hand.marker import DEFAULT_DICTIONARY, dictionaries
+from core.hand.model_file import MARKER_RANGE_M
 from core.hand.tracker import Refinement, TrackingOptions
 
 if TYPE_CHECKING:
     from core.hand.landmarks import HandDetector
 
-SMALLEST_MARKER_M = 0.008
-LARGEST_MARKER_M = 0.120
+SMALLEST_MARKER_M, LARGEST_MARKER_M = MARKER_RANGE_M
 LARGEST_THRESHOLD_M = 0.100
 MOST_LOST_FRAMES = 300
 
@@ -66,7 +66,7 @@ def read_millimetres(text: str, what: str, smallest_m: float, largest_m: float) 
     try:
         value_m = float(plain) / 1000.0
     except ValueError:
-        raise InputError(f"{what} is not a number.", "Type millimetres, such as 36.") from None
+        raise InputError(f"{what} is not a number.", "Type a number of millimetres.") from None
     if not smallest_m <= value_m <= largest_m:
         raise InputError(
             f"{what} must be between {1000 * smallest_m:.0f} and {1000 * largest_m:.0f} mm.",

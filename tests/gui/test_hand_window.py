@@ -362,7 +362,7 @@ def test_wrong_input_is_told_in_sentences(
         hands.type(name, text)
     hands.type("hand_dictionary", "DICT_9X9")
     hands.click("hand_options_use")
-    assert "between 8 and 120 mm" in hands.text("hand_marker_side_error")
+    assert "between 5 and 300 mm" in hands.text("hand_marker_side_error")
     assert "not a number" in hands.text("hand_threshold_error")
     assert "between 0 and 300" in hands.text("hand_lost_frames_error")
     assert "no ArUco dictionary 'DICT_9X9'" in hands.text("hand_dictionary_error")
