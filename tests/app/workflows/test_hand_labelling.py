@@ -189,7 +189,7 @@ def test_the_log_keeps_the_last_answer_of_every_frame(shot: HandShot, tmp_path: 
 
 def test_what_is_typed_wrongly_is_refused_with_what_to_type() -> None:
     assert read_millimetres(" 36,5 mm", "The side of the marker", 0.008, 0.12) == pytest.approx(0.0365)
-    for text, said in (("x", "not a number"), ("nan", "between 5 and 300 mm"), ("5000", "ruler")):
+    for text, said in (("x", "not a number"), ("nan", "between 8 and 120 mm"), ("500", "ruler")):
         with pytest.raises(InputError) as refused:
             read_millimetres(text, "The side of the marker", 0.008, 0.12)
         assert said in str(refused.value)
